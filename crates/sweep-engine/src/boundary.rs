@@ -34,7 +34,7 @@ mod trace;
 
 pub use quantity::TracedQuantity;
 pub use search::{BoundaryOptions, BoundaryTask};
-pub use trace::trace;
+pub use trace::trace_boundary;
 
 use sweep_parameter::named;
 
@@ -42,11 +42,11 @@ use sweep_parameter::named;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundaryTrial {
     /// The number of the curve: a combination of the axes beyond the second.
-    pub curve: usize,
+    pub curve_index: usize,
     /// The value of the first axis.
-    pub first: f64,
+    pub first_value: f64,
     /// The value of the second axis.
-    pub second: f64,
+    pub second_value: f64,
 }
 
 /// The range of the second axis that is searched.
@@ -57,14 +57,14 @@ pub struct SearchRange {
     /// The greatest value.
     pub greatest: f64,
     /// Whether crossings are predicted along the logarithm of the first axis.
-    pub first_log: bool,
+    pub is_first_log: bool,
     /// Whether the second axis is searched in its logarithm.
-    pub second_log: bool,
+    pub is_second_log: bool,
     /// The greatest width of a final bracket: in the second axis's unit, or as a fraction of its
     /// value if that axis is logarithmic.
     pub tolerance: f64,
     /// The number of cells of the lattice along each axis, at least 1.
-    pub lattice: usize,
+    pub lattice_cells: usize,
 }
 
 named! {
@@ -105,20 +105,20 @@ pub struct SideChange {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryRow {
     /// The value of the first axis.
-    pub first: f64,
+    pub first_value: f64,
     /// The changes of side from the least to the greatest value of the second axis; never empty.
     pub side_changes: Vec<SideChange>,
     /// The number of points evaluated.
-    pub trials: usize,
+    pub trial_count: usize,
 }
 
 /// The traced curves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TracedBoundary {
     /// The rows of each curve, in the first axis's order.
-    pub curves: Vec<Vec<BoundaryRow>>,
+    pub rows_by_curve: Vec<Vec<BoundaryRow>>,
     /// The number of points evaluated.
-    pub trials: usize,
+    pub trial_count: usize,
     /// The number of batches in which they were evaluated.
-    pub rounds: usize,
+    pub batch_count: usize,
 }

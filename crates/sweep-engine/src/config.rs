@@ -99,18 +99,18 @@ impl<M: Model> GridInput<M> {
     /// design. Axes with tolerances keep the values that the tolerances gave.
     pub fn from_plan(name: &str, plan: &Value) -> Self {
         let model_file_key = M::ABOUT.model_file.map(|file| file.key);
-        let is_read = |key: &str| {
+        let is_grid_key = |key: &str| {
             !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != model_file_key
         };
         let mut plan = plan.clone();
         for axis in plan.get_mut("axis").and_then(Value::as_array_mut).into_iter().flatten() {
             axis.as_object_mut().map(|axis| axis.remove("tolerance"));
         }
-        let grid_keys = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
-        let own_file_keys = model_file_key.and_then(|key| plan.get(key)?.as_object());
+        let grid_keys = plan.as_object().into_iter().flatten().filter(|(key, _)| is_grid_key(key));
+        let model_file_keys = model_file_key.and_then(|key| plan.get(key)?.as_object());
         Self {
             text: Some(plan_to_toml::file(grid_keys)),
-            model_file: own_file_keys.map(plan_to_toml::file),
+            model_file: model_file_keys.map(plan_to_toml::file),
             ..Self::file(name.into(), Vec::new())
         }
     }

@@ -36,7 +36,7 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 /// The options of a run.
 #[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
-    /// The number of worker threads (`threads::count`).
+    /// The number of worker threads (`threads::choose_count`).
     pub threads: usize,
     /// Whether to discard the rows of an earlier run.
     pub fresh: bool,
@@ -94,13 +94,14 @@ pub fn run(
     interrupt: &Interrupt,
 ) -> Result<RunReport, StoreError> {
     let RunOptions { threads, fresh, shard, environment, .. } = options;
-    let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
-        OpenOutcome::Finished((file, tally)) => {
-            let end = RunEnd::AlreadyFinished(Box::new(file), Box::new(tally));
-            return Ok(RunReport { end, session: None, notes: Vec::new() });
-        }
-        OpenOutcome::Open(run) => run,
-    };
+    let mut run =
+        match OpenRun::open(output, job, OpenOptions { starts_over: fresh, shard, environment })? {
+            OpenOutcome::Finished((file, tally)) => {
+                let end = RunEnd::AlreadyFinished(Box::new(file), Box::new(tally));
+                return Ok(RunReport { end, session: None, notes: Vec::new() });
+            }
+            OpenOutcome::Open(run) => run,
+        };
     let (points, stored_points) = run.count_own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.count));
@@ -198,7 +199,7 @@ impl Runner<'_> {
     /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::build_pool(self.threads)?;
-        let stored_rows = |point| run.stored_rows(point);
+        let stored_rows = |point| run.find_stored_rows(point);
         let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
         let (_, start) = run.count_own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
@@ -250,10 +251,10 @@ impl<'a> ChunkCollector<'a> {
         context: &'a RunContext<'a>,
         writer: SyncSender<(u64, Vec<PointRows>)>,
     ) -> Self {
-        let incomplete_chunks = run.take_incomplete();
+        let incomplete_chunks = run.take_incomplete_chunks();
         let stored: BTreeSet<u64> =
             incomplete_chunks.values().flatten().map(|row| row.point).collect();
-        let chunks = run.chunks();
+        let chunks = run.chunk_count();
         let stride = if runner.engine.shares_work_of_rows { 1 } else { chunk_stride(chunks) };
         let queue = (0..chunks)
             .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64)

@@ -43,13 +43,13 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 pub use differences::PlanDifference;
-pub use error::{Holder, StoreError};
+pub use error::{LockHolder, StoreError};
 use lock::Lock;
 pub use merge::write_map;
 pub use open::{OpenOptions, OpenOutcome, OpenRun};
 pub use provenance::Session;
 pub use read::{ResultFile, Tally};
-pub use schema::{BATCH_ROWS, CellType, DeclaredColumn, Layout, PointRows, ResultRows, RowCells};
+pub use schema::{BATCH_ROWS, BatchBuilder, CellType, DeclaredColumn, Layout, PointRows, RowCells};
 pub use shard::{Shard, ShardRequest, format_numbers as format_shard_numbers};
 pub use status::{FolderStatus, RunStage, read_status};
 pub use trials::{TrialColumns, TrialKey, Trials, WRITE_INTERVAL};

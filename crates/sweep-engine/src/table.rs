@@ -14,7 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
-use crate::store::schema::{CellType, DeclaredColumn, writer};
+use crate::store::schema::{CellType, DeclaredColumn, common_writer_properties};
 use crate::{Build, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{Writer, key, panics, seal};
@@ -126,7 +126,8 @@ impl Table {
         let Build { version, numerics } = self.build;
         self.add_text(key::VERSION, version.to_owned());
         self.add_text(key::NUMERICS, numerics.to_string());
-        let properties = writer(version, self.metadata).set_dictionary_enabled(false).build();
+        let properties =
+            common_writer_properties(version, self.metadata).set_dictionary_enabled(false).build();
         let field = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();
             let nullable = data_type == DataType::Float64;

@@ -5,7 +5,8 @@ use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::boundary::{
-    BoundaryOptions, BoundaryTask, SideChange, SideChangeKind, TracedBoundary, quantity, trace,
+    BoundaryOptions, BoundaryTask, SideChange, SideChangeKind, TracedBoundary, quantity,
+    trace_boundary,
 };
 use sweep_engine::evaluator::{CachedEvaluator, SearchStop};
 use sweep_engine::store::{OpenOutcome, Trials};
@@ -64,14 +65,20 @@ fn options_of_ratio(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
     BoundaryOptions { quantity: "ratio_max".to_owned(), limit: None, tolerance, lattice }
 }
 
-fn trace_boundary(
+fn trace_task(
     task: &Task,
     threads: usize,
     interrupt: &Interrupt,
 ) -> Result<TracedBoundary, SearchStop> {
-    let engine = Washer::engine(&task.plan, task.column()).unwrap();
+    let engine = Washer::engine(&task.plan, task.column_name()).unwrap();
     let evaluator = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
-    trace(&task.distances(&evaluator), &task.first_values, task.curves, &task.search, &mut |_| {})
+    trace_boundary(
+        &task.distance_evaluator(&evaluator),
+        &task.first_values,
+        task.curve_count,
+        &task.range,
+        &mut |_| {},
+    )
 }
 
 /// Returns the axis values of all points of a grid.
@@ -84,14 +91,14 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
     let plan = plan(&format!("{GRID_HEAD}{AXES}"));
     let task = Task::new(&plan, &options_of_ratio(Some(0.5), 3)).unwrap();
     let interrupt = Interrupt::new();
-    let traced = [1, 3].map(|threads| trace_boundary(&task, threads, &interrupt).unwrap());
+    let traced = [1, 3].map(|threads| trace_task(&task, threads, &interrupt).unwrap());
     let [one_thread, three_threads] = [0, 1].map(|k| task.table(&traced[k]).finish().unwrap().1);
     assert!(one_thread == three_threads, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
     let outcomes = engine.outcomes_at(&all_points(&plan));
-    for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
-        assert!(row.trials < 21, "{row:?}");
+    for (row, outcomes) in traced[0].rows_by_curve[0].iter().zip(outcomes.chunks(21)) {
+        assert!(row.trial_count < 21, "{row:?}");
         let side_change = row.side_changes[0];
         let distances: Vec<(f64, f64)> = outcomes
             .iter()
@@ -102,7 +109,7 @@ fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
             })
             .collect();
         let Some([low, high]) = side_change.bracket else {
-            assert_eq!((row.first, side_change.kind), (0.1, SideChangeKind::AllReliable));
+            assert_eq!((row.first_value, side_change.kind), (0.1, SideChangeKind::AllReliable));
             assert!(distances.iter().all(|(_, distance)| *distance < 0.0));
             continue;
         };
@@ -161,7 +168,7 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
         let coarse =
             plan(&format!("{criterion_head}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
         let task = Task::new(&coarse, &options_of_ratio(Some(0.5), 4)).unwrap();
-        let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let rows = trace_task(&task, 2, &Interrupt::new()).unwrap().rows_by_curve.remove(0);
         let side_changes: Vec<_> =
             rows.iter().map(|row| row.side_changes.last().copied().unwrap()).collect();
         assert!(
@@ -178,15 +185,15 @@ fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
         for (row, side_change) in rows.iter().zip(&side_changes) {
             let contour_point = contour_damping.windows(2).find_map(|pair| {
                 let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
-                let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
-                inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
+                let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first_value) && x0 != x1;
+                inside.then(|| y0 + (y1 - y0) * (row.first_value - x0) / (x1 - x0))
             });
             let contour_damping = contour_point.unwrap();
             let crossing = side_change.position.unwrap();
             assert!(
                 (contour_damping - crossing).abs() < 0.25,
                 "{criterion:?} at {} kg: {contour_damping} and {crossing}",
-                row.first
+                row.first_value
             );
         }
     }
@@ -222,16 +229,16 @@ fn grids_of_the_repository_have_the_brackets_of_an_earlier_search() {
     ];
     for (name, text, max_trials) in grids {
         let task = Task::new(&plan(text), &options_of_ratio(None, 6)).unwrap();
-        let traced = trace_boundary(&task, 2, &Interrupt::new()).unwrap();
-        println!("{name}: {} points in {} rounds", traced.trials, traced.rounds);
-        assert!(traced.trials <= max_trials, "{name}: {} points", traced.trials);
+        let traced = trace_task(&task, 2, &Interrupt::new()).unwrap();
+        println!("{name}: {} points in {} rounds", traced.trial_count, traced.batch_count);
+        assert!(traced.trial_count <= max_trials, "{name}: {} points", traced.trial_count);
         let mut brackets = Vec::new();
-        for row in &traced.curves[0] {
+        for row in &traced.rows_by_curve[0] {
             for side_change in
                 row.side_changes.iter().filter(|side_change| side_change.bracket.is_some())
             {
                 assert_eq!(side_change.kind, SideChangeKind::Crossing, "{name}: {row:?}");
-                brackets.push((row.first, side_change.bracket.unwrap()));
+                brackets.push((row.first_value, side_change.bracket.unwrap()));
             }
         }
         let expected = reference_brackets(name);
@@ -250,17 +257,17 @@ fn grids_of_the_repository_have_the_brackets_of_an_earlier_search() {
 fn an_interrupt_stops_a_search_before_the_next_group() {
     let plan = plan(&format!("{GRID_HEAD}{AXES}"));
     let task = Task::new(&plan, &options_of_ratio(None, 6)).unwrap();
-    assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
+    assert_eq!(task.range.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
-    assert!(matches!(trace_boundary(&task, 2, &interrupt), Err(SearchStop::Interrupted)));
+    assert!(matches!(trace_task(&task, 2, &interrupt), Err(SearchStop::Interrupted)));
 }
 
 #[test]
 fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
     let plan = plan(&format!("{GRID_HEAD}{AXES}"));
     let task = Task::new(&plan, &options_of_ratio(Some(2.0), 2)).unwrap();
-    let whole = trace_boundary(&task, 1, &Interrupt::new()).unwrap();
+    let whole = trace_task(&task, 1, &Interrupt::new()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("x.parquet");
     let job = task.job();
@@ -272,30 +279,36 @@ fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
             panic!()
         };
         let interrupt = Interrupt::new();
-        let trials_before = trials.count();
+        let trials_before = trials.trial_count();
         // The search is interrupted after five trials, in the middle of a batch.
         let stop_after_five_trials = |done: u64| {
             if done >= trials_before as u64 + 5 {
                 interrupt.raise(2);
             }
         };
-        let engine = Washer::engine(&task.plan, task.column()).unwrap();
+        let engine = Washer::engine(&task.plan, task.column_name()).unwrap();
         let evaluator =
             CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &stop_after_five_trials)
                 .unwrap();
-        let distances = task.distances(&evaluator);
-        let result = trace(&distances, &task.first_values, task.curves, &task.search, &mut |_| {});
+        let distances = task.distance_evaluator(&evaluator);
+        let result = trace_boundary(
+            &distances,
+            &task.first_values,
+            task.curve_count,
+            &task.range,
+            &mut |_| {},
+        );
         drop(distances);
         let trials = evaluator.into_cache().unwrap();
         match result {
             Ok(result) => break (result, trials),
-            Err(SearchStop::Interrupted) => assert!(trials.count() > trials_before),
+            Err(SearchStop::Interrupted) => assert!(trials.trial_count() > trials_before),
             Err(SearchStop::Failed(error)) => panic!("{error}"),
         }
         stops += 1;
     };
     assert!(stops > 1);
-    assert_eq!((result, trials.count()), (whole.clone(), whole.trials));
+    assert_eq!((result, trials.trial_count()), (whole.clone(), whole.trial_count));
 }
 
 #[test]
@@ -308,7 +321,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
                 range = { from = 60.0, to = 300.0, count = 33 }\n";
     let plan = plan(&format!("{head}{axes}"));
     let task = Task::new(&plan, &options_of_ratio(None, 6)).unwrap();
-    let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    let rows = trace_task(&task, 2, &Interrupt::new()).unwrap().rows_by_curve.remove(0);
     // At 0.1 m no damping is reliable. From 0.125 m on, all dampings above a crossing are reliable.
     // The row between the two has a reliable interval that contains no point of the lattice.
     let kinds: Vec<SideChangeKind> = rows.iter().map(|row| row.side_changes[0].kind).collect();
@@ -321,7 +334,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
     for row in &rows[..3] {
         let dampings: Vec<f64> = (0..=24).map(|k| 60.0 + 10.0 * f64::from(k)).collect();
         let points: Vec<Vec<f64>> =
-            dampings.iter().map(|damping| vec![row.first, *damping]).collect();
+            dampings.iter().map(|damping| vec![row.first_value, *damping]).collect();
         for (damping, outcome) in dampings.iter().zip(engine.outcomes_at(&points)) {
             let is_reliable = distance(&outcome, &plan) < 0.0;
             let bracket_below = row
@@ -337,7 +350,7 @@ fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
             let is_bracketed = |side_change: &SideChange| {
                 side_change.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1])
             };
-            let context = (row.first, damping, &row.side_changes);
+            let context = (row.first_value, damping, &row.side_changes);
             assert!(
                 expected == is_reliable || row.side_changes.iter().any(is_bracketed),
                 "{context:?}"
@@ -432,7 +445,7 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
         Task::new(&plan, &BoundaryOptions { quantity, limit, ..options_of_ratio(Some(2.0), 3) })
     };
     let crossings = |task: &Task| {
-        let rows = trace_boundary(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let rows = trace_task(task, 2, &Interrupt::new()).unwrap().rows_by_curve.remove(0);
         let side_changes = rows.into_iter().flat_map(|row| row.side_changes);
         let dampings: Vec<f64> =
             side_changes.filter_map(|side_change| side_change.position).collect();
@@ -455,7 +468,7 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
     let stricter =
         new_task("cabinet_force_nonlinear_n < 900 and min_gap_nonlinear_m > 0", None).unwrap();
     assert_eq!(stricter.quantity.limit, 0.0);
-    assert!(stricter.column().is_none());
+    assert!(stricter.column_name().is_none());
     let refusal = |quantity, limit| new_task(quantity, limit).unwrap_err().to_string();
     assert!(refusal("2 * ratio_max", None).contains("--limit"));
     assert!(refusal("ratio_max < 2", Some(2.0)).contains("none with a condition"));
@@ -473,10 +486,10 @@ fn a_force_crosses_its_limit_within_the_bracket() {
         &BoundaryOptions { quantity, limit: Some(limit), ..options_of_ratio(Some(2.0), 3) },
     )
     .unwrap();
-    let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    let rows = trace_task(&task, 2, &Interrupt::new()).unwrap().rows_by_curve.remove(0);
     let crossings = rows
         .iter()
-        .flat_map(|row| row.side_changes.iter().map(|side_change| (row.first, side_change)));
+        .flat_map(|row| row.side_changes.iter().map(|side_change| (row.first_value, side_change)));
     let mut crossing_count = 0;
     for (mass, side_change) in
         crossings.filter(|(_, side_change)| side_change.kind == SideChangeKind::Crossing)

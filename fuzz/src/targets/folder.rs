@@ -71,7 +71,7 @@ pub(crate) fn run(bytes: &[u8]) {
 }
 
 fn options() -> OpenOptions<'static> {
-    OpenOptions { fresh: false, shard: None, environment: &|_| None }
+    OpenOptions { starts_over: false, shard: None, environment: &|_| None }
 }
 
 /// Returns a part whose first or last bytes between the magic numbers are those of the input, with

@@ -42,7 +42,7 @@ pub(super) struct PredictedSide {
 /// Predicts the sides of a line at a position around its crossings, from the lines to its left and
 /// to its right, the nearest first. Returns `None` if the nearest two disagree, or if a predicted
 /// position is farther than a lattice cell from their crossing.
-pub(super) fn predict(
+pub(super) fn predict_sides(
     position: f64,
     parents: &[Vec<Neighbour<'_>>; 2],
     cell: f64,
@@ -53,21 +53,22 @@ pub(super) fn predict(
     if !left.agrees_with(right) {
         return None;
     }
-    if let [whole] = left.intervals {
+    if let [whole_interval] = left.intervals {
         return Some(
             [span.least, span.greatest]
-                .map(|position| PredictedSide { position, side: whole.side })
+                .map(|position| PredictedSide { position, side: whole_interval.side })
                 .into(),
         );
     }
-    let mut lines: Vec<&Neighbour<'_>> =
+    let mut agreeing_lines: Vec<&Neighbour<'_>> =
         parents.iter().flatten().filter(|line| line.agrees_with(left)).collect();
-    lines.sort_by(|a, b| (a.position - position).abs().total_cmp(&(b.position - position).abs()));
+    agreeing_lines
+        .sort_by(|a, b| (a.position - position).abs().total_cmp(&(b.position - position).abs()));
     let mut predicted_sides = Vec::new();
     for k in 1..left.intervals.len() {
-        let points: Vec<[f64; 2]> =
-            lines.iter().map(|line| [line.position, line.intervals[k].from]).collect();
-        let (root, correction) = extrapolate(&points, position);
+        let crossing_points: Vec<[f64; 2]> =
+            agreeing_lines.iter().map(|line| [line.position, line.intervals[k].from]).collect();
+        let (root, correction) = extrapolate(&crossing_points, position);
         let half_width = correction.abs().max(ROOT_MARGIN * span.tolerance);
         for (position, side) in [
             (root - half_width, left.intervals[k - 1].side),
@@ -86,20 +87,21 @@ pub(super) fn predict(
 /// Returns the value at a position of the polynomial through points at distinct positions, and its
 /// last correction, by Neville's algorithm.
 fn extrapolate(points: &[[f64; 2]], position: f64) -> (f64, f64) {
-    let mut values: Vec<f64> = points.iter().map(|point| point[1]).collect();
+    let mut polynomial_values: Vec<f64> = points.iter().map(|point| point[1]).collect();
     let mut correction = 0.0;
     // After round `m`, `values[i]` is that of the polynomial through points `i` to `i + m`.
     for m in 1..points.len() {
-        let previous = values[0];
+        let previous_value = polynomial_values[0];
         for i in 0..points.len() - m {
-            let from = points[i][0];
-            let to = points[i + m][0];
-            values[i] =
-                ((position - to) * values[i] + (from - position) * values[i + 1]) / (from - to);
+            let left_position = points[i][0];
+            let right_position = points[i + m][0];
+            polynomial_values[i] = ((position - right_position) * polynomial_values[i]
+                + (left_position - position) * polynomial_values[i + 1])
+                / (left_position - right_position);
         }
-        correction = values[0] - previous;
+        correction = polynomial_values[0] - previous_value;
     }
-    (values[0], correction)
+    (polynomial_values[0], correction)
 }
 
 /// A line, the neighbour with which it is compared, and the line beyond the neighbour.
@@ -112,53 +114,56 @@ pub(super) struct LinePair<'a> {
 
 impl LinePair<'_> {
     /// Returns the intervals on which the line is not on the side that its neighbour predicts.
-    pub(super) fn find_disputed(&self, cell: f64, span: &Span) -> Vec<[f64; 2]> {
+    pub(super) fn find_disputed_intervals(&self, cell: f64, span: &Span) -> Vec<[f64; 2]> {
         let intervals = self.line.intervals;
-        let predicted = self.move_neighbour(span);
+        let predicted_intervals = self.shift_neighbour_intervals(span);
         // A crossing and its prediction are a pair between which the sides differ, by as much as
         // the prediction is wrong.
-        let mut prediction_errors = shared_crossings(intervals, &predicted);
-        prediction_errors.retain(|[position, predicted]| {
-            (position - predicted).abs() <= DISPUTED_FRACTION * cell
+        let mut prediction_errors = find_shared_crossings(intervals, &predicted_intervals);
+        prediction_errors.retain(|[position, predicted_intervals]| {
+            (position - predicted_intervals).abs() <= DISPUTED_FRACTION * cell
         });
         let mut interval_ends: Vec<f64> = intervals
             .iter()
-            .chain(&predicted)
+            .chain(&predicted_intervals)
             .flat_map(|interval| [interval.from, interval.to])
             .collect();
         interval_ends.sort_by(f64::total_cmp);
         interval_ends.dedup();
-        let mut disputed = Vec::new();
+        let mut disputed_intervals = Vec::new();
         for pair in interval_ends.windows(2) {
             let from = pair[0];
             let to = pair[1];
             let middle = 0.5 * (from + to);
             let is_prediction_error =
                 prediction_errors.iter().any(|[a, b]| a.min(*b) <= from && to <= a.max(*b));
-            if !is_prediction_error && side_at(intervals, middle) != side_at(&predicted, middle) {
-                disputed.push([from, to]);
+            if !is_prediction_error
+                && side_at(intervals, middle) != side_at(&predicted_intervals, middle)
+            {
+                disputed_intervals.push([from, to]);
             }
         }
-        disputed
+        disputed_intervals
     }
 
     /// Returns the neighbour's intervals, moved to the positions that they should have on this
     /// line: on the straight line through both neighbours' crossings, or else as far as the nearest
     /// crossing that this line and the neighbour share.
-    fn move_neighbour(&self, span: &Span) -> Vec<SideInterval> {
+    fn shift_neighbour_intervals(&self, span: &Span) -> Vec<SideInterval> {
         let second_neighbour = self
             .second_neighbour
             .filter(|second_neighbour| second_neighbour.agrees_with(&self.neighbour));
-        let shared = shared_crossings(self.line.intervals, self.neighbour.intervals);
-        let displacement = |k: usize, position: f64| match second_neighbour {
+        let shared = find_shared_crossings(self.line.intervals, self.neighbour.intervals);
+        let displacement_at = |k: usize, position: f64| match second_neighbour {
             Some(second_neighbour) => {
                 let slope = (position - second_neighbour.intervals[k].from)
                     / (self.neighbour.position - second_neighbour.position);
                 slope * (self.line.position - self.neighbour.position)
             }
             None => {
-                let gap = |pair: &&[f64; 2]| (pair[1] - position).abs();
-                let nearest_crossing = shared.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
+                let distance_to = |pair: &&[f64; 2]| (pair[1] - position).abs();
+                let nearest_crossing =
+                    shared.iter().min_by(|a, b| distance_to(a).total_cmp(&distance_to(b)));
                 nearest_crossing.map_or(0.0, |[own, neighbours]| own - neighbours)
             }
         };
@@ -167,7 +172,7 @@ impl LinePair<'_> {
         for (k, interval) in self.neighbour.intervals.iter().enumerate() {
             let to = match self.neighbour.intervals.get(k + 1) {
                 Some(next) => {
-                    (next.from + displacement(k + 1, next.from)).clamp(from, span.greatest)
+                    (next.from + displacement_at(k + 1, next.from)).clamp(from, span.greatest)
                 }
                 None => span.greatest,
             };
@@ -182,13 +187,13 @@ impl LinePair<'_> {
 
 /// Returns the crossings that two lines share, as pairs of positions: each is the other's nearest
 /// between the same sides.
-fn shared_crossings(a: &[SideInterval], b: &[SideInterval]) -> Vec<[f64; 2]> {
-    let crossings_of_a = crossings(a);
-    let crossings_of_b = crossings(b);
+fn find_shared_crossings(a: &[SideInterval], b: &[SideInterval]) -> Vec<[f64; 2]> {
+    let crossings_of_a = find_crossings(a);
+    let crossings_of_b = find_crossings(b);
     let mut shared_pairs = Vec::new();
     for crossing in &crossings_of_a {
-        if let Some(partner) = nearest_crossing(crossing, &crossings_of_b)
-            && nearest_crossing(&partner, &crossings_of_a) == Some(*crossing)
+        if let Some(partner) = find_nearest_crossing(crossing, &crossings_of_b)
+            && find_nearest_crossing(&partner, &crossings_of_a) == Some(*crossing)
         {
             shared_pairs.push([crossing.position, partner.position]);
         }
@@ -203,17 +208,25 @@ struct LineCrossing {
     sides: [LimitSide; 2],
 }
 
-fn crossings(intervals: &[SideInterval]) -> Vec<LineCrossing> {
-    let change = |pair: &[SideInterval]| LineCrossing {
+fn find_crossings(intervals: &[SideInterval]) -> Vec<LineCrossing> {
+    let crossing_between = |pair: &[SideInterval]| LineCrossing {
         position: pair[1].from,
         sides: [pair[0].side, pair[1].side],
     };
-    intervals.windows(2).map(change).filter(|change| change.sides[0] != change.sides[1]).collect()
+    intervals
+        .windows(2)
+        .map(crossing_between)
+        .filter(|crossing_between| crossing_between.sides[0] != crossing_between.sides[1])
+        .collect()
 }
 
-fn nearest_crossing(crossing: &LineCrossing, candidates: &[LineCrossing]) -> Option<LineCrossing> {
-    let same_sides = candidates.iter().filter(|other| other.sides == crossing.sides);
-    same_sides
+fn find_nearest_crossing(
+    crossing: &LineCrossing,
+    candidates: &[LineCrossing],
+) -> Option<LineCrossing> {
+    let candidates_between_same_sides =
+        candidates.iter().filter(|other| other.sides == crossing.sides);
+    candidates_between_same_sides
         .min_by(|a, b| {
             (a.position - crossing.position)
                 .abs()
@@ -245,7 +258,11 @@ mod tests {
         intervals
     }
 
-    fn disputed(own: &[f64], neighbour: &[f64], second_neighbour: Option<&[f64]>) -> Vec<[f64; 2]> {
+    fn find_disputed(
+        own: &[f64],
+        neighbour: &[f64],
+        second_neighbour: Option<&[f64]>,
+    ) -> Vec<[f64; 2]> {
         let own = intervals(own);
         let neighbour = intervals(neighbour);
         let second_neighbour = second_neighbour.map(intervals);
@@ -256,14 +273,14 @@ mod tests {
                 .as_ref()
                 .map(|intervals| Neighbour { position: 1.0, intervals }),
         };
-        pair.find_disputed(CELL, &SPAN)
+        pair.find_disputed_intervals(CELL, &SPAN)
     }
 
     #[test]
     fn the_polynomial_goes_through_its_points_and_beyond() {
-        let cube = |x: f64| x * x * x - 2.0 * x;
-        let points = [0.0, 1.0, 3.0, 4.0].map(|x| [x, cube(x)]);
-        assert!((extrapolate(&points, 2.0).0 - cube(2.0)).abs() < 1e-12);
+        let cubic = |x: f64| x * x * x - 2.0 * x;
+        let points = [0.0, 1.0, 3.0, 4.0].map(|x| [x, cubic(x)]);
+        assert!((extrapolate(&points, 2.0).0 - cubic(2.0)).abs() < 1e-12);
         assert_eq!(extrapolate(&points[1..2], 9.0), (points[1][1], 0.0));
         let (value, correction) = extrapolate(&[[0.0, 1.0], [1.0, 3.0]], 2.0);
         assert_eq!((value, correction), (5.0, 4.0));
@@ -276,16 +293,17 @@ mod tests {
             let right = intervals(b);
             let left = Neighbour { position: 0.0, intervals: &left };
             let right = Neighbour { position: 2.0, intervals: &right };
-            let predicted = predict(1.0, &[vec![left], vec![right]], CELL, &SPAN)?;
+            let predicted = predict_sides(1.0, &[vec![left], vec![right]], CELL, &SPAN)?;
             Some(predicted.iter().map(|predicted| (predicted.position, predicted.side)).collect())
         };
         let reliable = LimitSide::Reliable;
         let unreliable = LimitSide::Unreliable;
-        let two_crossings: Option<Vec<_>> = predict_between(&[20.0, 60.0], &[22.0, 64.0]);
+        let sides_with_two_crossings: Option<Vec<_>> =
+            predict_between(&[20.0, 60.0], &[22.0, 64.0]);
         let expected = [(20.0, unreliable), (22.0, reliable), (60.0, reliable), (64.0, unreliable)];
-        assert_eq!(two_crossings, Some(expected.to_vec()));
-        let without_crossings = predict_between(&[], &[]);
-        assert_eq!(without_crossings, Some(vec![(0.0, unreliable), (100.0, unreliable)]));
+        assert_eq!(sides_with_two_crossings, Some(expected.to_vec()));
+        let sides_without_crossings = predict_between(&[], &[]);
+        assert_eq!(sides_without_crossings, Some(vec![(0.0, unreliable), (100.0, unreliable)]));
         assert_eq!(predict_between(&[20.0], &[]), None);
         assert_eq!(predict_between(&[20.0], &[40.2]), None, "farther than a cell");
         assert!(predict_between(&[20.0], &[39.8]).is_some());
@@ -293,18 +311,22 @@ mod tests {
 
     #[test]
     fn a_crossing_that_moves_on_is_not_disputed() {
-        assert_eq!(disputed(&[50.0], &[40.0], Some(&[30.0])), [[0.0; 2]; 0]);
-        assert_eq!(disputed(&[54.0], &[40.0], Some(&[30.0])), [[0.0; 2]; 0], "by less than 5");
-        assert_eq!(disputed(&[56.0], &[40.0], Some(&[30.0])), [[50.0, 56.0]]);
-        assert_eq!(disputed(&[50.0], &[40.0], None), [[0.0; 2]; 0], "moved as it has moved");
+        assert_eq!(find_disputed(&[50.0], &[40.0], Some(&[30.0])), [[0.0; 2]; 0]);
+        assert_eq!(find_disputed(&[54.0], &[40.0], Some(&[30.0])), [[0.0; 2]; 0], "by less than 5");
+        assert_eq!(find_disputed(&[56.0], &[40.0], Some(&[30.0])), [[50.0, 56.0]]);
+        assert_eq!(find_disputed(&[50.0], &[40.0], None), [[0.0; 2]; 0], "moved as it has moved");
     }
 
     #[test]
     fn a_pocket_of_the_neighbour_is_disputed_where_it_should_have_moved() {
-        assert_eq!(disputed(&[], &[40.0, 46.0], Some(&[35.0, 43.0])), [[45.0, 49.0]]);
-        assert_eq!(disputed(&[], &[40.0, 46.0], None), [[40.0, 46.0]]);
-        let beside_a_crossing = disputed(&[77.0], &[40.0, 46.0, 70.0], None);
-        assert_eq!(beside_a_crossing, [[47.0, 53.0]], "moved with the crossing beside it");
-        assert_eq!(disputed(&[], &[40.0, 41.0], Some(&[30.0, 40.0])), [[0.0; 2]; 0], "closed");
+        assert_eq!(find_disputed(&[], &[40.0, 46.0], Some(&[35.0, 43.0])), [[45.0, 49.0]]);
+        assert_eq!(find_disputed(&[], &[40.0, 46.0], None), [[40.0, 46.0]]);
+        let intervals_beside_a_crossing = find_disputed(&[77.0], &[40.0, 46.0, 70.0], None);
+        assert_eq!(
+            intervals_beside_a_crossing,
+            [[47.0, 53.0]],
+            "moved with the crossing beside it"
+        );
+        assert_eq!(find_disputed(&[], &[40.0, 41.0], Some(&[30.0, 40.0])), [[0.0; 2]; 0], "closed");
     }
 }

@@ -10,10 +10,10 @@ use sweep_files::{FileKind, key};
 
 /// A row of the file.
 struct SideChangeRow<'a> {
-    curve: usize,
+    curve_index: usize,
     row: &'a BoundaryRow,
     /// The number of the change of side on its line, from 1; 0 if there is none in range.
-    number: usize,
+    change_number: usize,
     side_change: &'a SideChange,
 }
 
@@ -38,34 +38,39 @@ impl<M: Model> BoundaryTask<M> {
         json!({
             "quantity": self.quantity.name,
             "limit": self.quantity.limit,
-            "tolerance": self.search.tolerance,
-            "lattice": self.search.lattice,
+            "tolerance": self.range.tolerance,
+            "lattice": self.range.lattice_cells,
         })
     }
 
     /// Returns the table of the traced curves.
-    pub fn table(&self, traced: &TracedBoundary) -> Table {
-        let mut boundary_metadata = self.settings();
-        boundary_metadata["worse"] = self.quantity.worse.name().into();
-        boundary_metadata["points"] = traced.trials.into();
-        boundary_metadata["rounds"] = traced.rounds.into();
+    pub fn table(&self, traced_boundary: &TracedBoundary) -> Table {
+        let mut search_metadata = self.settings();
+        search_metadata["worse"] = self.quantity.worse.name().into();
+        search_metadata["points"] = traced_boundary.trial_count.into();
+        search_metadata["rounds"] = traced_boundary.batch_count.into();
         let mut table = Table::new(M::ABOUT.build);
-        self.add_columns(&mut table, traced);
+        self.add_columns(&mut table, traced_boundary);
         let job = self.job();
         table.add_metadata(key::PLAN, &job.plan);
         table.add_text(key::PLAN_HASH, job.hash().to_hex().to_string());
-        table.add_metadata(key::BOUNDARY, &boundary_metadata);
+        table.add_metadata(key::BOUNDARY, &search_metadata);
         table
     }
 
-    fn add_columns(&self, table: &mut Table, traced: &TracedBoundary) {
+    fn add_columns(&self, table: &mut Table, traced_boundary: &TracedBoundary) {
         let TracedQuantity { name: quantity, unit, .. } = &self.quantity;
         let mut change_rows = Vec::new();
-        for (curve, rows) in traced.curves.iter().enumerate() {
+        for (curve, rows) in traced_boundary.rows_by_curve.iter().enumerate() {
             for row in rows {
                 for (k, side_change) in row.side_changes.iter().enumerate() {
                     let number = if side_change.bracket.is_some() { k + 1 } else { 0 };
-                    change_rows.push(SideChangeRow { curve, row, number, side_change });
+                    change_rows.push(SideChangeRow {
+                        curve_index: curve,
+                        row,
+                        change_number: number,
+                        side_change,
+                    });
                 }
             }
         }
@@ -81,7 +86,7 @@ impl<M: Model> BoundaryTask<M> {
             "crossing",
             "number of this change of side at this value of the first axis, from 1 upwards along \
              the second; 0 where none is in range",
-            change_rows.iter().map(|change_row| change_row.number as u64),
+            change_rows.iter().map(|change_row| change_row.change_number as u64),
         );
         let change_counts = change_rows.iter().map(|change_row| {
             change_row
@@ -101,7 +106,7 @@ impl<M: Model> BoundaryTask<M> {
             };
             table.add_numbers(&name, unit, &description, change_rows.iter().map(value));
         }
-        let trial_counts = change_rows.iter().map(|change_row| change_row.row.trials as u64);
+        let trial_counts = change_rows.iter().map(|change_row| change_row.row.trial_count as u64);
         table.add_counts(
             "points",
             "points evaluated at this value of the first axis",
@@ -116,12 +121,13 @@ impl<M: Model> BoundaryTask<M> {
         let unit = second.parameter.unit;
         table.add_parameter(
             &first.parameter,
-            change_rows.iter().map(|change_row| Some(change_row.row.first)),
+            change_rows.iter().map(|change_row| Some(change_row.row.first_value)),
         );
-        let second_meaning = second.parameter.description;
+        let second_description = second.parameter.description;
         let TracedQuantity { name: quantity, limit, .. } = &self.quantity;
-        let description =
-            format!("{second_meaning}, where {quantity} = {limit}; null unless it is a crossing");
+        let description = format!(
+            "{second_description}, where {quantity} = {limit}; null unless it is a crossing"
+        );
         table.add_numbers(
             name,
             unit,
@@ -144,7 +150,7 @@ impl<M: Model> BoundaryTask<M> {
         }
         for (k, axis) in other_axes.iter().enumerate() {
             let values = change_rows.iter().map(|change_row| {
-                self.plan.axis_values(change_row.curve as u64).get(2 + k).copied()
+                self.plan.axis_values(change_row.curve_index as u64).get(2 + k).copied()
             });
             table.add_parameter(&axis.parameter, values);
         }

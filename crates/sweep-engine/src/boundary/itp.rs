@@ -49,8 +49,8 @@ impl Itp {
     ) -> f64 {
         let width = high - low;
         let middle = 0.5 * (low + high);
-        let widest_next = 0.5 * self.tolerance * libm::exp2(f64::from(self.steps_left));
-        let r = (widest_next - 0.5 * width).max(0.0);
+        let max_next_width = 0.5 * self.tolerance * libm::exp2(f64::from(self.steps_left));
+        let r = (max_next_width - 0.5 * width).max(0.0);
         self.steps_left -= 1;
         let Some([distance_low, distance_high]) = distances else { return middle };
         let x_f = low + width * (distance_low / (distance_low - distance_high));
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     /// Returns how many evaluations narrow a bracket of a root at 0 to the tolerance.
-    fn evaluations(function: &dyn Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -> usize {
+    fn count_evaluations(function: &dyn Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -> usize {
         let [mut low, mut high] = ends;
         let mut itp = Itp::new(high - low, tolerance);
         let mut count = 0;
@@ -97,11 +97,12 @@ mod tests {
             let tolerance = 10.0_f64.powf(-3.0 * random.f64());
             let steepness = 10.0_f64.powf(4.0 * random.f64() - 2.0);
             let skew = 10.0_f64.powf(6.0 * random.f64() - 3.0);
-            let saturated = |x: f64| (steepness * x).tanh() * if x < 0.0 { skew } else { 1.0 };
-            let flat = |x: f64| steepness * x.powi(9) + 1e-9 * x;
+            let saturated_function =
+                |x: f64| (steepness * x).tanh() * if x < 0.0 { skew } else { 1.0 };
+            let flat_function = |x: f64| steepness * x.powi(9) + 1e-9 * x;
             let bisections = ((ends[1] - ends[0]) / tolerance).log2().ceil().max(0.0) as usize;
-            for function in [&saturated as &dyn Fn(f64) -> f64, &flat] {
-                let count = evaluations(function, ends, tolerance);
+            for function in [&saturated_function as &dyn Fn(f64) -> f64, &flat_function] {
+                let count = count_evaluations(function, ends, tolerance);
                 assert!(
                     count <= bisections + 1,
                     "{count} > {bisections} + 1: {ends:?} {tolerance}"
@@ -113,7 +114,7 @@ mod tests {
     #[test]
     fn a_smooth_function_takes_far_fewer_than_bisection() {
         let function = |x: f64| (0.3 * x).exp() - 1.0;
-        assert!(evaluations(&function, [-2.0, 3.0], 1e-9) <= 12, "bisection takes 33");
+        assert!(count_evaluations(&function, [-2.0, 3.0], 1e-9) <= 12, "bisection takes 33");
     }
 
     #[test]

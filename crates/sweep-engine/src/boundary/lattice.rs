@@ -17,7 +17,7 @@ pub(super) struct PlannedLine {
     /// The value of the first axis, or its logarithm.
     pub position: f64,
     /// The index among the values of the first axis.
-    pub index: usize,
+    pub value_index: usize,
     /// The ranks of the lines from which this line is predicted, to its left and to its right, the
     /// nearest first; none for a lattice line.
     pub parents: [Vec<usize>; 2],
@@ -30,7 +30,7 @@ impl PlannedLine {
 }
 
 /// Returns the columns of a lattice: evenly spread positions, with both ends.
-pub(super) fn columns(span: &Span, cells: usize) -> Vec<f64> {
+pub(super) fn lattice_columns(span: &Span, cells: usize) -> Vec<f64> {
     let width = span.greatest - span.least;
     let mut columns: Vec<f64> =
         (0..cells).map(|k| span.least + width * (k as f64 / cells as f64)).collect();
@@ -51,7 +51,7 @@ pub(super) fn lattice_ranks(lines: usize, cells: usize) -> Vec<usize> {
 pub(super) fn plan_lines(positions: &[f64], cells: usize) -> Vec<PlannedLine> {
     let mut lines = Vec::with_capacity(positions.len());
     for (index, &position) in positions.iter().enumerate() {
-        lines.push(PlannedLine { position, index, parents: Default::default() });
+        lines.push(PlannedLine { position, value_index: index, parents: Default::default() });
     }
     lines.sort_by(|a, b| a.position.total_cmp(&b.position));
     let mut planned_ranks = lattice_ranks(lines.len(), cells);
@@ -101,7 +101,7 @@ mod tests {
                     }
                 }
                 assert!(planned.iter().all(|is_planned| *is_planned), "{count} {cells}");
-                assert!(lines.iter().all(|line| positions[line.index] == line.position));
+                assert!(lines.iter().all(|line| positions[line.value_index] == line.position));
             }
         }
     }
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn columns_end_at_the_ends() {
         let span = Span { least: 0.1, greatest: 0.7, tolerance: 0.01 };
-        let columns = columns(&span, 3);
+        let columns = lattice_columns(&span, 3);
         assert_eq!((columns[0], columns[3], columns.len()), (0.1, 0.7, 4));
     }
 }

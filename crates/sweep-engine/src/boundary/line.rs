@@ -24,9 +24,9 @@ pub(super) struct LineSearch {
     /// The samples in order of position, no two at the same.
     samples: Vec<LineSample>,
     /// The requested positions that have not been taken yet.
-    requested: Vec<f64>,
+    requested_positions: Vec<f64>,
     /// The open brackets with their root finders.
-    brackets: Vec<([f64; 2], Itp)>,
+    open_brackets: Vec<([f64; 2], Itp)>,
 }
 
 impl LineSearch {
@@ -35,16 +35,16 @@ impl LineSearch {
         for requested in positions {
             let position = requested.clamp(span.least, span.greatest);
             if self.sample_at(position).is_none() {
-                self.requested.push(position);
+                self.requested_positions.push(position);
             }
         }
-        self.requested.sort_by(f64::total_cmp);
-        self.requested.dedup();
+        self.requested_positions.sort_by(f64::total_cmp);
+        self.requested_positions.dedup();
     }
 
     /// Whether some requested positions have not been taken yet.
     pub(super) fn has_requests(&self) -> bool {
-        !self.requested.is_empty()
+        !self.requested_positions.is_empty()
     }
 
     pub(super) fn insert(&mut self, sample: LineSample) {
@@ -74,11 +74,11 @@ impl LineSearch {
     /// none if every bracket is narrow.
     pub(super) fn take_positions(&mut self, span: &Span) -> Vec<f64> {
         if self.has_requests() {
-            return std::mem::take(&mut self.requested);
+            return std::mem::take(&mut self.requested_positions);
         }
-        let earlier_brackets = std::mem::take(&mut self.brackets);
+        let earlier_brackets = std::mem::take(&mut self.open_brackets);
         let open_brackets: Vec<[LineSample; 2]> =
-            self.sample_brackets().filter(|[low, high]| is_open(low, high, span)).collect();
+            self.sample_brackets().filter(|[low, high]| needs_narrowing(low, high, span)).collect();
         let mut positions = Vec::with_capacity(open_brackets.len());
         for [low, high] in open_brackets {
             let width = high.position - low.position;
@@ -99,7 +99,7 @@ impl LineSearch {
                 high.position,
                 distances.map(<[f64; 2]>::from),
             ));
-            self.brackets.push(([low.position, high.position], itp));
+            self.open_brackets.push(([low.position, high.position], itp));
         }
         positions
     }
@@ -108,7 +108,7 @@ impl LineSearch {
     /// `widest`. If there are any, a position beyond either end is added, so that a side that
     /// appears in the interval has narrow brackets. No position is within half a tolerance of a
     /// sample.
-    pub(super) fn subdivide(&self, interval: [f64; 2], widest: f64, span: &Span) -> Vec<f64> {
+    pub(super) fn subdivide(&self, interval: [f64; 2], max_gap: f64, span: &Span) -> Vec<f64> {
         let [from, to] = interval;
         let sample_positions = self
             .samples
@@ -117,20 +117,22 @@ impl LineSearch {
             .filter(|position| from < *position && *position < to);
         let interval_ends: Vec<f64> =
             [from].into_iter().chain(sample_positions).chain([to]).collect();
-        let least_gap = 0.5 * span.tolerance;
-        let is_new = |position: &f64| {
-            self.samples.iter().all(|sample| (sample.position - position).abs() >= least_gap)
+        let min_gap = 0.5 * span.tolerance;
+        let is_far_from_samples = |position: &f64| {
+            self.samples.iter().all(|sample| (sample.position - position).abs() >= min_gap)
         };
         let mut positions = Vec::new();
         for gap in interval_ends.windows(2) {
             let width = gap[1] - gap[0];
             // Rounding must not add a gap.
-            let pieces = libm::ceil(width / widest - 1e-6);
-            let divisions = (1..pieces as usize).map(|k| gap[0] + width * (k as f64 / pieces));
-            positions.extend(divisions.filter(is_new));
+            let piece_count = libm::ceil(width / max_gap - 1e-6);
+            let division_positions =
+                (1..piece_count as usize).map(|k| gap[0] + width * (k as f64 / piece_count));
+            positions.extend(division_positions.filter(is_far_from_samples));
         }
         if !positions.is_empty() {
-            positions.extend([from - widest, to + widest].into_iter().filter(is_new));
+            positions
+                .extend([from - max_gap, to + max_gap].into_iter().filter(is_far_from_samples));
         }
         positions
     }
@@ -158,7 +160,11 @@ impl LineSearch {
 
     /// Returns the changes of side of the line in order; `value` returns the value of the second
     /// axis at a position.
-    pub(super) fn side_changes(&self, span: &Span, value: &dyn Fn(f64) -> f64) -> Vec<SideChange> {
+    pub(super) fn side_changes(
+        &self,
+        span: &Span,
+        axis_value: &dyn Fn(f64) -> f64,
+    ) -> Vec<SideChange> {
         let mut side_changes = Vec::new();
         for [low, high] in self.sample_brackets() {
             let is_narrow = high.position - low.position <= span.tolerance;
@@ -177,8 +183,8 @@ impl LineSearch {
                 if kind == SideChangeKind::Crossing { interpolate_root(&low, &high) } else { None };
             side_changes.push(SideChange {
                 kind,
-                position: root.map(value),
-                bracket: Some([value(low.position), value(high.position)]),
+                position: root.map(axis_value),
+                bracket: Some([axis_value(low.position), axis_value(high.position)]),
                 distances: [low.distance, high.distance],
             });
         }
@@ -200,7 +206,7 @@ impl LineSearch {
 }
 
 /// Whether a bracket has to be narrowed: it is wider than the tolerance, or may contain a jump.
-fn is_open(low: &LineSample, high: &LineSample, span: &Span) -> bool {
+fn needs_narrowing(low: &LineSample, high: &LineSample, span: &Span) -> bool {
     let width = high.position - low.position;
     let middle = 0.5 * (low.position + high.position);
     let may_jump = match (low.finite_distance(), high.finite_distance()) {

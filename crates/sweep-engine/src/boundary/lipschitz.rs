@@ -19,8 +19,8 @@ const RELIABILITY: f64 = 1.75;
 
 /// Returns the positions to evaluate next: one in every gap wider than `min_gap` that may hide two
 /// roots.
-pub(super) fn candidates(samples: &[LineSample], min_gap: f64) -> Vec<f64> {
-    let slopes: Vec<f64> = samples.windows(2).map(|gap| slope(&gap[0], &gap[1])).collect();
+pub(super) fn candidate_positions(samples: &[LineSample], min_gap: f64) -> Vec<f64> {
+    let slopes: Vec<f64> = samples.windows(2).map(|gap| slope_between(&gap[0], &gap[1])).collect();
     let mut positions = Vec::new();
     for (k, gap) in samples.windows(2).enumerate() {
         let low = gap[0];
@@ -32,11 +32,13 @@ pub(super) fn candidates(samples: &[LineSample], min_gap: f64) -> Vec<f64> {
             continue;
         }
         let adjacent_slopes = &slopes[k.saturating_sub(1)..slopes.len().min(k + 2)];
-        let steepest = adjacent_slopes.iter().copied().fold(0.0, f64::max);
-        let lipschitz = RELIABILITY * steepest;
-        if lipschitz * width > distance_low.abs() + distance_high.abs() {
+        let steepest_slope = adjacent_slopes.iter().copied().fold(0.0, f64::max);
+        let lipschitz_constant = RELIABILITY * steepest_slope;
+        if lipschitz_constant * width > distance_low.abs() + distance_high.abs() {
             let middle = 0.5 * (low.position + high.position);
-            positions.push(middle + (distance_low.abs() - distance_high.abs()) / (2.0 * lipschitz));
+            positions.push(
+                middle + (distance_low.abs() - distance_high.abs()) / (2.0 * lipschitz_constant),
+            );
         }
     }
     positions
@@ -44,10 +46,10 @@ pub(super) fn candidates(samples: &[LineSample], min_gap: f64) -> Vec<f64> {
 
 /// Returns the steepness between two samples of one side; 0 between others, whose bracket may
 /// contain a jump.
-fn slope(low: &LineSample, high: &LineSample) -> f64 {
-    match (low.finite_distance(), high.finite_distance()) {
-        (Some(distance_low), Some(distance_high)) if low.side() == high.side() => {
-            ((distance_high - distance_low) / (high.position - low.position)).abs()
+fn slope_between(lower: &LineSample, upper: &LineSample) -> f64 {
+    match (lower.finite_distance(), upper.finite_distance()) {
+        (Some(distance_low), Some(distance_high)) if lower.side() == upper.side() => {
+            ((distance_high - distance_low) / (upper.position - lower.position)).abs()
         }
         _ => 0.0,
     }
@@ -57,7 +59,7 @@ fn slope(low: &LineSample, high: &LineSample) -> f64 {
 mod tests {
     use super::*;
 
-    fn line(samples: &[(f64, f64)]) -> Vec<LineSample> {
+    fn samples_at(samples: &[(f64, f64)]) -> Vec<LineSample> {
         samples.iter().map(|&(position, d)| LineSample { position, distance: Some(d) }).collect()
     }
 
@@ -67,7 +69,7 @@ mod tests {
         let mut samples: Vec<(f64, f64)> =
             [0.0, 40.0, 80.0].map(|position| (position, function(position))).to_vec();
         loop {
-            let positions = candidates(&line(&samples), min_gap);
+            let positions = candidate_positions(&samples_at(&samples), min_gap);
             if positions.is_empty() {
                 return samples.iter().any(|(_, distance)| *distance < 0.0);
             }
@@ -80,24 +82,31 @@ mod tests {
     fn a_gap_is_searched_only_if_the_slope_allows_two_roots() {
         // The slope of 0.01 allows a change of 0.8 over the gap, and the samples' distances add up
         // to twice as much.
-        assert!(candidates(&line(&[(0.0, 1.2), (40.0, 0.8)]), 5.0).is_empty());
-        let positions = candidates(&line(&[(0.0, 1.2), (40.0, 0.1)]), 5.0);
+        assert!(candidate_positions(&samples_at(&[(0.0, 1.2), (40.0, 0.8)]), 5.0).is_empty());
+        let positions = candidate_positions(&samples_at(&[(0.0, 1.2), (40.0, 0.1)]), 5.0);
         assert_eq!(positions.len(), 1);
         assert!(
             20.0 < positions[0] && positions[0] < 40.0,
             "nearer to the sample at 0.1: {positions:?}"
         );
-        assert!(candidates(&line(&[(0.0, 1.2), (40.0, 0.1)]), 40.0).is_empty(), "not wide enough");
-        assert!(candidates(&line(&[(0.0, 0.4), (40.0, -0.4)]), 5.0).is_empty(), "a bracket");
+        assert!(
+            candidate_positions(&samples_at(&[(0.0, 1.2), (40.0, 0.1)]), 40.0).is_empty(),
+            "not wide enough"
+        );
+        assert!(
+            candidate_positions(&samples_at(&[(0.0, 0.4), (40.0, -0.4)]), 5.0).is_empty(),
+            "a bracket"
+        );
     }
 
     #[test]
     fn a_dip_with_slopes_like_those_beside_it_is_found_wherever_it_is() {
         for k in 0..=200 {
-            let bottom = 5.0 + 0.15 * f64::from(k);
+            let bottom_position = 5.0 + 0.15 * f64::from(k);
             // The dip is 12 wide, and its slope is that of the samples at 40 and 80.
-            let function = |x: f64| ((x - bottom).abs() * 0.05 - 0.3).min(0.025 * (x - 40.0) + 0.5);
-            assert!(finds_dip(function, 1.0), "{bottom}");
+            let function =
+                |x: f64| ((x - bottom_position).abs() * 0.05 - 0.3).min(0.025 * (x - 40.0) + 0.5);
+            assert!(finds_dip(function, 1.0), "{bottom_position}");
         }
     }
 }

@@ -28,12 +28,12 @@ pub struct TracedQuantity {
     /// The side of the limit that is bad.
     pub worse: Worse,
     /// The scale of distances from the limit.
-    pub scale: Scale,
+    pub distance_scale: DistanceScale,
 }
 
 /// The scale of distances from a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scale {
+pub enum DistanceScale {
     /// The logarithm of the quantity over its limit.
     Logarithm,
     /// The difference, divided by this unit.
@@ -43,26 +43,26 @@ pub enum Scale {
 impl TracedQuantity {
     /// Returns the signed distance of a value from the limit, negative on the good side.
     pub fn distance(&self, value: f64) -> f64 {
-        match (self.scale, self.worse) {
-            (Scale::Logarithm, worse) => {
+        match (self.distance_scale, self.worse) {
+            (DistanceScale::Logarithm, worse) => {
                 let distance = worse.excess(libm::log(value / self.limit), 0.0);
                 // A ratio on the good side of the limit stays there, even if its logarithm rounds
                 // to 0.
                 let is_good = worse.excess(value, self.limit) < 0.0;
                 if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
             }
-            (Scale::Difference(unit_of_distance), worse) => {
-                worse.excess(value, self.limit) / unit_of_distance
+            (DistanceScale::Difference(distance_unit), worse) => {
+                worse.excess(value, self.limit) / distance_unit
             }
         }
     }
 
     /// Returns the quantity at a signed distance from the limit.
     pub fn value(&self, distance: f64) -> f64 {
-        let away = self.worse.excess(distance, 0.0);
-        match self.scale {
-            Scale::Logarithm => self.limit * libm::exp(away),
-            Scale::Difference(unit_of_distance) => self.limit + away * unit_of_distance,
+        let signed_excess = self.worse.excess(distance, 0.0);
+        match self.distance_scale {
+            DistanceScale::Logarithm => self.limit * libm::exp(signed_excess),
+            DistanceScale::Difference(distance_unit) => self.limit + signed_excess * distance_unit,
         }
     }
 }
@@ -71,26 +71,26 @@ impl TracedQuantity {
 /// channels and metrics that the grid file leaves out.
 pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<M>)> {
     // The plan of a channel's columns compares this channel alone.
-    let channel_plan = |channel: &Channel| {
+    let plan_of_channel = |channel: &Channel| {
         let mut plan = plan.clone();
         plan.reliability.channels = vec![*channel];
-        (plan, Some(channel_columns(channel.name)))
+        (plan, Some(channel_column_names(channel.name)))
     };
     let mut plan_with_lower_limit = plan.clone();
     plan_with_lower_limit.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
     let other_plans = [plan.clone(), plan_with_lower_limit].into_iter().chain(M::variants(plan));
     let plans =
-        M::ABOUT.channels.iter().map(channel_plan).chain(other_plans.map(|plan| (plan, None)));
+        M::ABOUT.channels.iter().map(plan_of_channel).chain(other_plans.map(|plan| (plan, None)));
     let mut columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
     for (plan, allowed_columns) in plans {
         for column in M::layout(&plan).columns {
-            let is_number =
-                matches!(column.kind, CellType::Measured | CellType::Time | CellType::Count);
+            let has_numbers =
+                matches!(column.cell_type, CellType::Measured | CellType::Time | CellType::Count);
             let is_allowed = allowed_columns
                 .as_ref()
                 .is_none_or(|allowed_columns| allowed_columns.contains(&column.name));
-            let is_new = columns.iter().all(|(known, _)| known.name != column.name);
-            if is_number && column.metadata.worse.is_some() && is_allowed && is_new {
+            let is_new_column = columns.iter().all(|(known, _)| known.name != column.name);
+            if has_numbers && column.metadata.worse.is_some() && is_allowed && is_new_column {
                 columns.push((column, plan.clone()));
             }
         }
@@ -177,14 +177,14 @@ pub fn derive_quantity<M: Model>(
             unit: "1".to_owned(),
             limit: 0.0,
             worse: Worse::Less,
-            scale: Scale::Difference(1.0),
+            distance_scale: DistanceScale::Difference(1.0),
         },
         Some(limit) => TracedQuantity {
             name: text.to_owned(),
             unit: goal.unit().to_owned(),
             limit,
             worse: Worse::Greater,
-            scale: Scale::Difference(if limit == 0.0 { 1.0 } else { limit.abs() }),
+            distance_scale: DistanceScale::Difference(if limit == 0.0 { 1.0 } else { limit.abs() }),
         },
     };
     let plan = plans.into_iter().nth(plan_index).unwrap_or_else(|| plan.clone());
@@ -194,12 +194,12 @@ pub fn derive_quantity<M: Model>(
 /// Returns plans of the same points with more and more columns: the plan itself, each with a
 /// further measurement, one with all of them, and one with all channels too.
 fn plans_by_columns<M: Model>(plan: &Plan<M>) -> Vec<Plan<M>> {
-    let variants = M::variants(plan);
-    let mut with_channels = variants.last().unwrap_or(plan).clone();
-    with_channels.reliability.channels = M::ABOUT.channels.to_vec();
+    let variant_plans = M::variants(plan);
+    let mut plan_with_channels = variant_plans.last().unwrap_or(plan).clone();
+    plan_with_channels.reliability.channels = M::ABOUT.channels.to_vec();
     let mut plans = vec![plan.clone()];
-    plans.extend(variants);
-    plans.push(with_channels);
+    plans.extend(variant_plans);
+    plans.push(plan_with_channels);
     plans
 }
 
@@ -210,21 +210,21 @@ fn plans_by_columns<M: Model>(plan: &Plan<M>) -> Vec<Plan<M>> {
 ///
 /// # Errors
 /// A batch without the columns of the expression.
-pub fn margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowError> {
-    let Some(number) = goal.evaluate(row)? else { return Ok(None) };
+pub fn row_margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowError> {
+    let Some(goal_value) = goal.evaluate(row)? else { return Ok(None) };
     if !goal.is_constraint() {
-        return Ok(Some(number));
+        return Ok(Some(goal_value));
     }
     let slack = goal.slack(row)?.map(|slack| slack.relative);
     // The condition itself decides at its limits, where the slack is 0.
-    Ok(Some(match (number == 0.0, slack) {
+    Ok(Some(match (goal_value == 0.0, slack) {
         (true, slack) => slack.unwrap_or(1.0).max(f64::MIN_POSITIVE),
         (false, slack) => slack.unwrap_or(-1.0).min(0.0),
     }))
 }
 
 /// Returns the names of a channel's columns.
-fn channel_columns(name: &str) -> [String; 3] {
+fn channel_column_names(name: &str) -> [String; 3] {
     [RATIO_PREFIX, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
 }
 
@@ -242,52 +242,61 @@ pub fn find_quantity<M: Model>(
     let mut candidates = traceable_columns(plan);
     let Some(index) = candidates.iter().position(|(column, _)| column.name == name) else {
         let names = || candidates.iter().map(|(column, _)| column.name.as_str());
-        let kind = |name: &str| name.split('_').next().map(str::to_owned);
-        let is_of_kind = |known: &str| kind(known) == kind(name);
+        let name_prefix = |name: &str| name.split('_').next().map(str::to_owned);
+        let has_same_prefix = |known: &str| name_prefix(known) == name_prefix(name);
         let required_setting = M::ABOUT
             .required_settings
             .iter()
-            .find(|(prefix, _)| kind(name).as_deref() == Some(prefix));
-        if let Some((_, required_setting)) = required_setting.filter(|_| !names().any(is_of_kind)) {
+            .find(|(prefix, _)| name_prefix(name).as_deref() == Some(prefix));
+        if let Some((_, required_setting)) =
+            required_setting.filter(|_| !names().any(has_same_prefix))
+        {
             return Err(Error::option("--quantity", name, required_setting));
         }
         let suggestion = nearest_name(name, names());
         let suggestion =
             suggestion.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-        let known_columns: Vec<String> =
-            M::ABOUT.channels.iter().flat_map(|channel| channel_columns(channel.name)).collect();
-        let is_of_channel = |name: &&str| known_columns.iter().any(|known| known == name);
-        let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
+        let all_channel_columns: Vec<String> = M::ABOUT
+            .channels
+            .iter()
+            .flat_map(|channel| channel_column_names(channel.name))
+            .collect();
+        let is_channel_column = |name: &&str| all_channel_columns.iter().any(|known| known == name);
+        let names: Vec<&str> = names().filter(|name| !is_channel_column(name)).collect();
         let names = names.join(", ");
-        let [ratio, nonlinear, linear] = channel_columns("CHANNEL");
+        let [ratio, nonlinear, linear] = channel_column_names("CHANNEL");
         let optional_columns = M::ABOUT.further_columns;
         let expected =
             format!("one of {names}, {ratio}, {nonlinear}, {linear}{optional_columns}{suggestion}");
         return Err(Error::option("--quantity", name, expected));
     };
     let (column, mut plan) = candidates.swap_remove(index);
-    let Some(value) = limit.or(column.metadata.limit) else {
+    let Some(limit_value) = limit.or(column.metadata.limit) else {
         let unit = &column.metadata.unit;
         let expected = format!("--limit with it, in {unit}: it has no limit of its own");
         return Err(Error::option("--quantity", name, expected));
     };
     let is_ratio = name.starts_with(RATIO_PREFIX);
-    let scale = column.limit_scale.unwrap_or(value.abs());
-    if !value.is_finite() || (is_ratio && value <= 0.0) || scale == 0.0 {
+    let scale = column.limit_scale.unwrap_or(limit_value.abs());
+    if !limit_value.is_finite() || (is_ratio && limit_value <= 0.0) || scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
-        return Err(Error::option("--limit", value, expected));
+        return Err(Error::option("--limit", limit_value, expected));
     }
     if name == LEAST_RATIO_COLUMN {
-        plan.reliability.limits.lower = Some(value);
+        plan.reliability.limits.lower = Some(limit_value);
     } else if is_ratio {
-        plan.reliability.limits.upper = value;
+        plan.reliability.limits.upper = limit_value;
     }
     let quantity = TracedQuantity {
         name: column.name,
         unit: column.metadata.unit,
-        limit: value,
+        limit: limit_value,
         worse: column.metadata.worse.unwrap_or(Worse::Greater),
-        scale: if is_ratio { Scale::Logarithm } else { Scale::Difference(scale) },
+        distance_scale: if is_ratio {
+            DistanceScale::Logarithm
+        } else {
+            DistanceScale::Difference(scale)
+        },
     };
     Ok((quantity, plan))
 }

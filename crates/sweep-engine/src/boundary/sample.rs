@@ -14,8 +14,8 @@ impl SearchRange {
     /// Returns the range that is searched, in coordinates.
     pub(super) fn span(&self) -> Span {
         Span {
-            least: coordinate(self.least, self.second_log),
-            greatest: coordinate(self.greatest, self.second_log),
+            least: coordinate(self.least, self.is_second_log),
+            greatest: coordinate(self.greatest, self.is_second_log),
             tolerance: self.tolerance,
         }
     }
@@ -28,7 +28,7 @@ impl SearchRange {
             self.least
         } else if position >= span.greatest {
             self.greatest
-        } else if self.second_log {
+        } else if self.is_second_log {
             libm::exp(position)
         } else {
             position

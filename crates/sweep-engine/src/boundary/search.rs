@@ -1,13 +1,15 @@
 //! The task of a plan, and a model's distances at trial points.
 
-use super::lattice::{columns, lattice_ranks};
-use super::quantity::{DerivedQuantity, derive_quantity, find_quantity, is_column_name, margin};
+use super::lattice::{lattice_columns, lattice_ranks};
+use super::quantity::{
+    DerivedQuantity, derive_quantity, find_quantity, is_column_name, row_margin,
+};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::arguments::parse_finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
 use crate::optimise::search::row_defect;
 use crate::store::{
-    CellType, DeclaredColumn, Layout, PointRows, ResultRows, TrialColumns, TrialKey, axis_columns,
+    BatchBuilder, CellType, DeclaredColumn, Layout, PointRows, TrialColumns, TrialKey, axis_columns,
 };
 use crate::{AxisValues, Error, Model, Plan, StoreError};
 use sweep_results::Goal;
@@ -59,9 +61,9 @@ pub struct BoundaryTask<M: Model> {
     /// The values of the first axis, in grid order.
     pub first_values: Vec<f64>,
     /// The number of curves: combinations of the axes beyond the second.
-    pub curves: usize,
+    pub curve_count: usize,
     /// The search along the second axis.
-    pub search: SearchRange,
+    pub range: SearchRange,
 }
 
 impl<M: Model> BoundaryTask<M> {
@@ -105,61 +107,67 @@ impl<M: Model> BoundaryTask<M> {
         }
         // Plans hold at most 1e12 points, so the products fit.
         let curves: u64 = other_axes.iter().map(|axis| axis.values.len()).product();
-        let rows = first.values.len() * curves;
-        if rows > MAX_LINES {
+        let line_count = first.values.len() * curves;
+        if line_count > MAX_LINES {
             return refuse(format!(
-                "{rows} rows (values of the first axis, times the combinations of the axes beyond \
-                 the second) are more than {MAX_LINES}: trace parts of them"
+                "{line_count} rows (values of the first axis, times the combinations of the axes \
+                 beyond the second) are more than {MAX_LINES}: trace parts of them"
             ));
         }
         let second_log = matches!(second.values, AxisValues::Log { .. });
-        let extent = if second_log { libm::log(greatest / least) } else { greatest - least };
+        let range_extent = if second_log { libm::log(greatest / least) } else { greatest - least };
         let requested_tolerance =
-            options.tolerance.unwrap_or(extent / DEFAULT_TOLERANCES_PER_RANGE);
-        if !(extent * MIN_TOLERANCE_FRACTION..=extent).contains(&requested_tolerance) {
+            options.tolerance.unwrap_or(range_extent / DEFAULT_TOLERANCES_PER_RANGE);
+        if !(range_extent * MIN_TOLERANCE_FRACTION..=range_extent).contains(&requested_tolerance) {
             return refuse(format!(
-                "--tolerance {requested_tolerance} is out of range: expected from {:e} to {extent} \
-                 for the \
-                 second axis",
-                extent * MIN_TOLERANCE_FRACTION
+                "--tolerance {requested_tolerance} is out of range: expected from {:e} to \
+                 {range_extent} for the second axis",
+                range_extent * MIN_TOLERANCE_FRACTION
             ));
         }
         let search = SearchRange {
             least,
             greatest,
-            first_log: matches!(first.values, AxisValues::Log { .. }),
-            second_log,
+            is_first_log: matches!(first.values, AxisValues::Log { .. }),
+            is_second_log: second_log,
             tolerance: requested_tolerance,
-            lattice: options.lattice.into(),
+            lattice_cells: options.lattice.into(),
         };
         let first_values = (0..first.values.len()).map(|k| first.values.value(k)).collect();
-        Ok(Self { plan, quantity, expression, first_values, curves: curves as usize, search })
+        Ok(Self {
+            plan,
+            quantity,
+            expression,
+            first_values,
+            curve_count: curves as usize,
+            range: search,
+        })
     }
 
     /// Returns the largest size of a cell of the lattice along the first and the second axis, in
     /// their units.
-    pub fn cell(&self) -> [f64; 2] {
+    pub fn max_cell_size(&self) -> [f64; 2] {
         let mut first_values = self.first_values.clone();
         first_values.sort_by(f64::total_cmp);
-        let lines: Vec<f64> = lattice_ranks(first_values.len(), self.search.lattice)
+        let line_values: Vec<f64> = lattice_ranks(first_values.len(), self.range.lattice_cells)
             .into_iter()
             .map(|rank| first_values[rank])
             .collect();
-        let columns: Vec<f64> = columns(&self.search.span(), self.search.lattice)
+        let column_values: Vec<f64> = lattice_columns(&self.range.span(), self.range.lattice_cells)
             .into_iter()
-            .map(|position| self.search.value(position))
+            .map(|position| self.range.value(position))
             .collect();
-        [lines, columns]
+        [line_values, column_values]
             .map(|positions| positions.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max))
     }
 
     /// Returns the name of the column that is at its limit, if it is one.
-    pub fn column(&self) -> Option<&str> {
+    pub fn column_name(&self) -> Option<&str> {
         self.expression.is_none().then_some(self.quantity.name.as_str())
     }
 
     /// Computes the quantity of a point.
-    fn value(
+    fn point_value(
         &self,
         layout: &Layout,
         axis_values: Vec<f64>,
@@ -167,20 +175,22 @@ impl<M: Model> BoundaryTask<M> {
     ) -> Result<Option<f64>, StoreError> {
         let Some(expression) = &self.expression else {
             let index = layout.columns.iter().position(|column| column.name == self.quantity.name);
-            let cell = index.and_then(|index| Some((index, point_rows.rows.first()?[index])));
-            return Ok(cell.and_then(|(index, cell)| layout.columns[index].number(cell)));
+            let index_and_cell =
+                index.and_then(|index| Some((index, point_rows.rows.first()?[index])));
+            return Ok(index_and_cell
+                .and_then(|(index, index_and_cell)| layout.columns[index].number(index_and_cell)));
         };
-        let mut rows = ResultRows::new(layout);
+        let mut rows = BatchBuilder::new(layout);
         let point = point_rows.point;
         for row in point_rows.rows.into_iter().take(1) {
-            rows.push(point, axis_values.clone(), row);
+            rows.push_row(point, axis_values.clone(), row);
         }
-        let value = rows.take().and_then(|batch| margin(expression, &batch));
+        let value = rows.take_batch().and_then(|batch| row_margin(expression, &batch));
         Ok(value.map_err(row_defect)?.filter(|value| value.is_finite()))
     }
 
     /// Returns the function that evaluates the distances at trial points.
-    pub fn distances<'a>(
+    pub fn distance_evaluator<'a>(
         &'a self,
         evaluator: &'a CachedEvaluator<'_>,
     ) -> impl Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, SearchStop> + 'a {
@@ -188,25 +198,26 @@ impl<M: Model> BoundaryTask<M> {
         move |trials| {
             let values: Vec<Vec<f64>> =
                 trials.iter().map(|trial| self.axis_values(trial)).collect();
-            let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
-            let keys: Vec<TrialKey> = values.iter().map(key).collect();
+            let to_key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
+            let keys: Vec<TrialKey> = values.iter().map(to_key).collect();
             let values = |k: usize, _: u64| values[k].clone();
-            let respond = |k: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
-                let distance = |point_rows: PointRows| -> Result<Option<f64>, StoreError> {
-                    let value = self.value(&layout, values(k, 0), point_rows)?;
-                    Ok(value.map(|value| self.quantity.distance(value)))
+            let reduce_rows =
+                |k: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
+                    let to_distance = |point_rows: PointRows| -> Result<Option<f64>, StoreError> {
+                        let value = self.point_value(&layout, values(k, 0), point_rows)?;
+                        Ok(value.map(|value| self.quantity.distance(value)))
+                    };
+                    points.into_iter().map(to_distance).collect()
                 };
-                points.into_iter().map(distance).collect()
-            };
-            Ok(evaluator.evaluate(&keys, 1, &values, &respond)?.concat())
+            Ok(evaluator.evaluate(&keys, 1, &values, &reduce_rows)?.concat())
         }
     }
 
     /// Returns the values of the axes at a trial point.
     fn axis_values(&self, trial: &BoundaryTrial) -> Vec<f64> {
         // The axes beyond the second vary fastest.
-        let mut values = self.plan.axis_values(trial.curve as u64);
-        values[..2].copy_from_slice(&[trial.first, trial.second]);
+        let mut values = self.plan.axis_values(trial.curve_index as u64);
+        values[..2].copy_from_slice(&[trial.first_value, trial.second_value]);
         values
     }
 
@@ -218,6 +229,6 @@ impl<M: Model> BoundaryTask<M> {
              is not defined"
         );
         let distance = DeclaredColumn::new("distance", "1", description, CellType::Measured);
-        TrialColumns { keys: axis_columns(&self.plan), responses: vec![distance] }
+        TrialColumns { key_columns: axis_columns(&self.plan), value_columns: vec![distance] }
     }
 }

@@ -10,10 +10,10 @@ use super::*;
 pub(crate) const SEARCH_RANGE: SearchRange = SearchRange {
     least: 60.0,
     greatest: 300.0,
-    first_log: false,
-    second_log: false,
+    is_first_log: false,
+    is_second_log: false,
     tolerance: 0.5,
-    lattice: 6,
+    lattice_cells: 6,
 };
 
 fn spread_masses(count: u32) -> Vec<f64> {
@@ -30,21 +30,21 @@ pub(crate) fn trace_and_check(
     let evaluate = |trials: &[BoundaryTrial]| {
         evaluated_trials.borrow_mut().extend_from_slice(trials);
         batch_sizes.borrow_mut().push(trials.len());
-        Ok(trials.iter().map(|trial| distance(trial.first, trial.second)).collect())
+        Ok(trials.iter().map(|trial| distance(trial.first_value, trial.second_value)).collect())
     };
     let mut check_line_count = |rows| assert!(rows < first_values.len(), "{rows}");
     let Ok::<_, Infallible>(traced_boundary) =
-        trace(&evaluate, first_values, 1, search, &mut check_line_count);
+        trace_boundary(&evaluate, first_values, 1, search, &mut check_line_count);
     let evaluated_trials = evaluated_trials.borrow();
     let batch_sizes = batch_sizes.borrow();
     assert!(batch_sizes.iter().all(|&trials| trials > 0), "{batch_sizes:?}");
     assert_eq!(
-        (traced_boundary.trials, traced_boundary.rounds),
+        (traced_boundary.trial_count, traced_boundary.batch_count),
         (evaluated_trials.len(), batch_sizes.len())
     );
     let mut trial_keys: Vec<[u64; 2]> = evaluated_trials
         .iter()
-        .map(|trial| [trial.first.to_bits(), trial.second.to_bits()])
+        .map(|trial| [trial.first_value.to_bits(), trial.second_value.to_bits()])
         .collect();
     trial_keys.sort_unstable();
     trial_keys.dedup();
@@ -52,7 +52,7 @@ pub(crate) fn trace_and_check(
     assert!(
         evaluated_trials
             .iter()
-            .all(|trial| (search.least..=search.greatest).contains(&trial.second))
+            .all(|trial| (search.least..=search.greatest).contains(&trial.second_value))
     );
     traced_boundary
 }
@@ -77,11 +77,11 @@ pub(crate) fn check_side_changes(
     distance: impl Fn(f64, f64) -> Option<f64>,
     tolerance: f64,
 ) {
-    for row in &traced_boundary.curves[0] {
+    for row in &traced_boundary.rows_by_curve[0] {
         for side_change in &row.side_changes {
             let Some([low, high]) = side_change.bracket else { continue };
             assert!(high - low <= tolerance, "{row:?}");
-            let [a, b] = [distance(row.first, low), distance(row.first, high)];
+            let [a, b] = [distance(row.first_value, low), distance(row.first_value, high)];
             assert_eq!(side_change.distances, [a, b], "{row:?}");
             assert_ne!(a.map(|a| a < 0.0), b.map(|b| b < 0.0), "{row:?}");
             assert!(
@@ -97,9 +97,9 @@ fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
     let first_values = spread_masses(39);
     let traced_boundary = trace_and_check(fig12_distance, &first_values, &SEARCH_RANGE);
     check_side_changes(&traced_boundary, fig12_distance, 0.5);
-    assert!(traced_boundary.trials <= 39 * 33 / 5, "{}", traced_boundary.trials);
-    for (row, &mass) in traced_boundary.curves[0].iter().zip(&first_values) {
-        assert_eq!((row.first, row.side_changes.len()), (mass, 1));
+    assert!(traced_boundary.trial_count <= 39 * 33 / 5, "{}", traced_boundary.trial_count);
+    for (row, &mass) in traced_boundary.rows_by_curve[0].iter().zip(&first_values) {
+        assert_eq!((row.first_value, row.side_changes.len()), (mass, 1));
         let side_change = row.side_changes[0];
         if boundary_damping(mass) <= 60.0 {
             assert_eq!(side_change.kind, SideChangeKind::AllReliable, "{mass}");
@@ -122,7 +122,7 @@ fn the_cost_of_a_trace_is_pinned() {
         |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
     let trace_cost = |distance: &dyn Fn(f64, f64) -> Option<f64>, rows| {
         let traced_boundary = trace_and_check(distance, &spread_masses(rows), &SEARCH_RANGE);
-        (traced_boundary.trials, traced_boundary.rounds)
+        (traced_boundary.trial_count, traced_boundary.batch_count)
     };
     let costs = [
         trace_cost(&fig12_distance, 5),
@@ -137,14 +137,15 @@ fn the_cost_of_a_trace_is_pinned() {
 #[test]
 fn jumps_are_distinguished_from_steep_crossings() {
     let step_distance = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
-    for row in &trace_and_check(step_distance, &spread_masses(12), &SEARCH_RANGE).curves[0] {
+    for row in &trace_and_check(step_distance, &spread_masses(12), &SEARCH_RANGE).rows_by_curve[0] {
         let side_change = row.side_changes[0];
         assert_eq!((side_change.kind, side_change.position), (SideChangeKind::Jump, None));
         let [low, high] = side_change.bracket.unwrap();
         assert!(low < 137.3 && 137.3 <= high && high - low <= 0.5 / 16.0);
     }
     let steep_distance = |_: f64, damping: f64| Some(((137.3 - damping) * 5.0).clamp(-0.6, 1.0));
-    for row in &trace_and_check(steep_distance, &spread_masses(12), &SEARCH_RANGE).curves[0] {
+    for row in &trace_and_check(steep_distance, &spread_masses(12), &SEARCH_RANGE).rows_by_curve[0]
+    {
         assert_eq!(row.side_changes[0].kind, SideChangeKind::Crossing);
         assert!((row.side_changes[0].position.unwrap() - 137.3).abs() < 0.03, "{row:?}");
     }
@@ -156,14 +157,14 @@ fn several_crossings_are_several_changes_of_side() {
         |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
     let traced_boundary = trace_and_check(wave_distance, &spread_masses(20), &SEARCH_RANGE);
     check_side_changes(&traced_boundary, wave_distance, 0.5);
-    for row in &traced_boundary.curves[0] {
+    for row in &traced_boundary.rows_by_curve[0] {
         let roots: Vec<f64> = (0..12)
-            .map(|k| 20.0 * row.first + 25.0 * std::f64::consts::PI * f64::from(k))
+            .map(|k| 20.0 * row.first_value + 25.0 * std::f64::consts::PI * f64::from(k))
             .filter(|root| (60.0..300.0).contains(root))
             .collect();
         let positions: Vec<f64> =
             row.side_changes.iter().map(|side_change| side_change.position.unwrap()).collect();
-        assert_eq!(positions.len(), roots.len(), "{}", row.first);
+        assert_eq!(positions.len(), roots.len(), "{}", row.first_value);
         assert!(
             positions.iter().zip(&roots).all(|(position, root)| (position - root).abs() < 0.1),
             "{positions:?} {roots:?}"
@@ -183,8 +184,8 @@ fn an_island_as_wide_as_two_cells_is_found_in_every_row_it_spans() {
         };
         let traced_boundary = trace_and_check(disc_distance, &spread_masses(39), &SEARCH_RANGE);
         check_side_changes(&traced_boundary, disc_distance, 0.5);
-        for row in &traced_boundary.curves[0] {
-            let x = (row.first - 0.5) / 0.3;
+        for row in &traced_boundary.rows_by_curve[0] {
+            let x = (row.first_value - 0.5) / 0.3;
             if x.abs() < 0.97 {
                 assert_eq!(row.side_changes.len(), 2, "{row:?}");
             } else if x.abs() > 1.0 {
@@ -215,8 +216,12 @@ fn distance_with_dip(mass: f64, damping: f64) -> Option<f64> {
 fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
     let traced_boundary = trace_and_check(distance_with_dip, &spread_masses(39), &SEARCH_RANGE);
     check_side_changes(&traced_boundary, distance_with_dip, 0.5);
-    let side_changes: Vec<usize> =
-        traced_boundary.curves[0].iter().rev().take(5).map(|row| row.side_changes.len()).collect();
+    let side_changes: Vec<usize> = traced_boundary.rows_by_curve[0]
+        .iter()
+        .rev()
+        .take(5)
+        .map(|row| row.side_changes.len())
+        .collect();
     assert_eq!(side_changes, [3, 3, 3, 1, 1]);
 }
 
@@ -236,7 +241,7 @@ fn a_pocket_that_ends_between_rows_is_found_up_to_its_last_row() {
     };
     let traced_boundary = trace_and_check(pocket_distance, &heights, &SEARCH_RANGE);
     check_side_changes(&traced_boundary, pocket_distance, 0.5);
-    let rows = &traced_boundary.curves[0];
+    let rows = &traced_boundary.rows_by_curve[0];
     assert_eq!(rows[0].side_changes[0].kind, SideChangeKind::AllUnreliable);
     for (row, height) in rows.iter().zip(&heights).skip(1) {
         let mut expected_positions = vec![lower_limit_damping(*height)];
@@ -263,8 +268,8 @@ fn a_pocket_found_late_is_followed_through_every_row() {
     let traced_boundary =
         trace_and_check(slanted_pocket_distance, &spread_masses(39), &SEARCH_RANGE);
     check_side_changes(&traced_boundary, slanted_pocket_distance, 0.5);
-    for row in &traced_boundary.curves[0] {
-        let crosses_pocket = ((row.first - 0.55) / 0.3).abs() < 0.9;
+    for row in &traced_boundary.rows_by_curve[0] {
+        let crosses_pocket = ((row.first_value - 0.55) / 0.3).abs() < 0.9;
         assert!(row.side_changes.len() == 2 || !crosses_pocket, "{row:?}");
     }
 }
@@ -280,10 +285,10 @@ fn pockets_are_found_once_a_cell_fits_into_them() {
     let range = SearchRange { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH_RANGE };
     // These cells are 0.299 s wide.
     let traced_boundary =
-        trace_and_check(distance, &spread_masses(3), &SearchRange { lattice: 87, ..range });
+        trace_and_check(distance, &spread_masses(3), &SearchRange { lattice_cells: 87, ..range });
     check_side_changes(&traced_boundary, distance, 0.02);
     assert!(
-        traced_boundary.curves[0].iter().all(|row| row.side_changes.len() == 6),
+        traced_boundary.rows_by_curve[0].iter().all(|row| row.side_changes.len() == 6),
         "{traced_boundary:?}"
     );
 }
@@ -294,7 +299,7 @@ fn undefined_quantities_are_reported() {
         if damping < 100.0 { None } else { fig12_distance(mass, damping) }
     };
     let trace_rows = |distance: &dyn Fn(f64, f64) -> Option<f64>, first_values: &[f64]| {
-        trace_and_check(distance, first_values, &SEARCH_RANGE).curves.remove(0)
+        trace_and_check(distance, first_values, &SEARCH_RANGE).rows_by_curve.remove(0)
     };
     let rows = trace_rows(&partly_undefined_distance, &[0.2, 0.6]);
     let kinds_by_row: Vec<Vec<SideChangeKind>> = rows
@@ -324,7 +329,7 @@ fn a_row_without_a_change_of_side_has_no_number() {
     {
         let traced_boundary =
             trace_and_check(|_, _| Some(distance), &spread_masses(39), &SEARCH_RANGE);
-        for row in &traced_boundary.curves[0] {
+        for row in &traced_boundary.rows_by_curve[0] {
             let side_change =
                 SideChange { kind, position: None, bracket: None, distances: [None; 2] };
             assert_eq!(row.side_changes, [side_change]);
@@ -349,7 +354,7 @@ fn the_search_of_noise_ends() {
         let traced_boundary = trace_and_check(noise_distance, &spread_masses(17), &SEARCH_RANGE);
         check_side_changes(&traced_boundary, noise_distance, 0.5);
         // The bound is twice the number of trials at every tolerance.
-        assert!(traced_boundary.trials <= 2 * 17 * 480, "{}", traced_boundary.trials);
+        assert!(traced_boundary.trial_count <= 2 * 17 * 480, "{}", traced_boundary.trial_count);
     }
 }
 
@@ -362,37 +367,42 @@ fn logarithmic_axes_are_searched_in_their_logarithms() {
     let log_range = SearchRange {
         least: 1e4,
         greatest: 1e9,
-        first_log: true,
-        second_log: true,
+        is_first_log: true,
+        is_second_log: true,
         tolerance: 0.01,
         ..SEARCH_RANGE
     };
-    for row in &trace_and_check(distance, &first_values, &log_range).curves[0] {
+    for row in &trace_and_check(distance, &first_values, &log_range).rows_by_curve[0] {
         let side_change = row.side_changes[0];
         let [low, high] = side_change.bracket.unwrap();
         assert!((high / low).ln() <= 0.0101, "{side_change:?}");
-        assert!((side_change.position.unwrap() / boundary_value(row.first)).ln().abs() < 0.005);
+        assert!(
+            (side_change.position.unwrap() / boundary_value(row.first_value)).ln().abs() < 0.005
+        );
     }
 }
 
 #[test]
 fn curves_share_batches() {
     let evaluate_shifted_curves = |trials: &[BoundaryTrial]| -> Result<_, Infallible> {
-        let distance = |t: &BoundaryTrial| fig12_distance(t.first, t.second - 9.0 * t.curve as f64);
+        let distance = |t: &BoundaryTrial| {
+            fig12_distance(t.first_value, t.second_value - 9.0 * t.curve_index as f64)
+        };
         Ok(trials.iter().map(distance).collect())
     };
     let first_values = spread_masses(39);
-    let [Ok(trace_with_one_curve), Ok(trace_with_three_curves)] = [1, 3]
-        .map(|n| trace(&evaluate_shifted_curves, &first_values, n, &SEARCH_RANGE, &mut |_| {}));
+    let [Ok(trace_with_one_curve), Ok(trace_with_three_curves)] = [1, 3].map(|n| {
+        trace_boundary(&evaluate_shifted_curves, &first_values, n, &SEARCH_RANGE, &mut |_| {})
+    });
     assert!(
-        trace_with_three_curves.rounds <= trace_with_one_curve.rounds + 4,
+        trace_with_three_curves.batch_count <= trace_with_one_curve.batch_count + 4,
         "{} for {}",
-        trace_with_three_curves.rounds,
-        trace_with_one_curve.rounds
+        trace_with_three_curves.batch_count,
+        trace_with_one_curve.batch_count
     );
-    for (k, rows) in trace_with_three_curves.curves.iter().enumerate() {
+    for (k, rows) in trace_with_three_curves.rows_by_curve.iter().enumerate() {
         for row in rows {
-            let expected_damping = boundary_damping(row.first) + 9.0 * k as f64;
+            let expected_damping = boundary_damping(row.first_value) + 9.0 * k as f64;
             let position = row.side_changes[0].position;
             assert!(
                 position.map_or(expected_damping <= 60.0, |position| (position - expected_damping)
@@ -411,9 +421,12 @@ fn rows_in_any_order_give_the_same_changes_of_side() {
     shuffled_values.swap(0, 7);
     shuffled_values.reverse();
     let mut rows =
-        trace_and_check(fig12_distance, &shuffled_values, &SEARCH_RANGE).curves.remove(0);
-    rows.sort_by(|a, b| a.first.total_cmp(&b.first));
-    assert_eq!(rows, trace_and_check(fig12_distance, &first_values, &SEARCH_RANGE).curves[0]);
+        trace_and_check(fig12_distance, &shuffled_values, &SEARCH_RANGE).rows_by_curve.remove(0);
+    rows.sort_by(|a, b| a.first_value.total_cmp(&b.first_value));
+    assert_eq!(
+        rows,
+        trace_and_check(fig12_distance, &first_values, &SEARCH_RANGE).rows_by_curve[0]
+    );
 }
 
 #[test]
@@ -424,8 +437,9 @@ fn an_evaluator_that_stops_ends_the_search() {
         if batch_count.get() == 3 {
             return Err("enough");
         }
-        Ok(trials.iter().map(|t| fig12_distance(t.first, t.second)).collect())
+        Ok(trials.iter().map(|t| fig12_distance(t.first_value, t.second_value)).collect())
     };
-    let result = trace(&stop_at_third_batch, &spread_masses(9), 1, &SEARCH_RANGE, &mut |_| {});
+    let result =
+        trace_boundary(&stop_at_third_batch, &spread_masses(9), 1, &SEARCH_RANGE, &mut |_| {});
     assert_eq!(result, Err("enough"));
 }

@@ -15,8 +15,8 @@
 //!   two the outer is on another side, so it is outside of the rectangle, and the crossing between
 //!   the two is as well. So the interval between these crossings spans the rectangle.
 
-use super::continuation::{DISPUTED_FRACTION, LinePair, Neighbour, PredictedSide, predict};
-use super::lattice::{PlannedLine, columns, plan_lines};
+use super::continuation::{DISPUTED_FRACTION, LinePair, Neighbour, PredictedSide, predict_sides};
+use super::lattice::{PlannedLine, lattice_columns, plan_lines};
 use super::line::LineSearch;
 use super::lipschitz;
 use super::sample::{LineSample, SideInterval, Span, coordinate};
@@ -40,7 +40,7 @@ const MIN_GAP_FRACTION: f64 = 0.125;
 ///
 /// # Errors
 /// The error with which `evaluate` stopped.
-pub fn trace<E>(
+pub fn trace_boundary<E>(
     evaluate: &dyn Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, E>,
     first_values: &[f64],
     curves: usize,
@@ -48,27 +48,27 @@ pub fn trace<E>(
     report_lines: &mut dyn FnMut(usize),
 ) -> Result<TracedBoundary, E> {
     let mut boundary =
-        TracedBoundary { curves: Vec::with_capacity(curves), ..TracedBoundary::default() };
+        TracedBoundary { rows_by_curve: Vec::with_capacity(curves), ..TracedBoundary::default() };
     let curves_at_once = (MAX_GROUP_LINES / first_values.len().max(1)).max(1);
-    while boundary.curves.len() < curves {
-        let first_curve = boundary.curves.len();
-        let end = (first_curve + curves_at_once).min(curves);
-        let mut group = CurveGroup::new(first_curve..end, first_values, search);
+    while boundary.rows_by_curve.len() < curves {
+        let first_curve = boundary.rows_by_curve.len();
+        let end_curve = (first_curve + curves_at_once).min(curves);
+        let mut curve_group = CurveGroup::new(first_curve..end_curve, first_values, search);
         loop {
-            let batch = group.next_batch();
+            let batch = curve_group.next_batch();
             if batch.is_empty() {
                 break;
             }
-            report_lines(first_curve * first_values.len() + group.lines_traced());
+            report_lines(first_curve * first_values.len() + curve_group.count_traced_lines());
             let trials: Vec<BoundaryTrial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
             for (request, distance) in batch.iter().zip(distances) {
-                group.insert(request, distance);
+                curve_group.insert_distance(request, distance);
             }
-            boundary.trials += trials.len();
-            boundary.rounds += 1;
+            boundary.trial_count += trials.len();
+            boundary.batch_count += 1;
         }
-        boundary.curves.extend(group.finish());
+        boundary.rows_by_curve.extend(curve_group.into_rows());
     }
     Ok(boundary)
 }
@@ -115,15 +115,15 @@ struct LineState {
 impl<'a> CurveGroup<'a> {
     fn new(curves: std::ops::Range<usize>, first_values: &'a [f64], search: &SearchRange) -> Self {
         let span = search.span();
-        let cells = search.lattice.max(1);
+        let cells = search.lattice_cells.max(1);
         let positions: Vec<f64> =
-            first_values.iter().map(|first| coordinate(*first, search.first_log)).collect();
+            first_values.iter().map(|first| coordinate(*first, search.is_first_log)).collect();
         Self {
             first_curve: curves.start,
             first_values,
             search: *search,
             span,
-            columns: columns(&span, cells),
+            columns: lattice_columns(&span, cells),
             cell_width: (span.greatest - span.least) / cells as f64,
             lines: plan_lines(&positions, cells),
             curves: vec![vec![LineState::default(); first_values.len()]; curves.len()],
@@ -135,12 +135,12 @@ impl<'a> CurveGroup<'a> {
         let mut batch = Vec::new();
         for curve in 0..self.curves.len() {
             for rank in 0..self.lines.len() {
-                self.advance(curve, rank, &mut batch);
+                self.request_trials(curve, rank, &mut batch);
             }
             for rank in 0..self.lines.len() {
-                if self.curves[curve][rank].search.is_none() && self.may_begin(curve, rank) {
+                if self.curves[curve][rank].search.is_none() && self.can_begin(curve, rank) {
                     self.begin_line(curve, rank);
-                    self.advance(curve, rank, &mut batch);
+                    self.request_trials(curve, rank, &mut batch);
                 }
             }
             for (rank, positions) in self.find_disputes(curve) {
@@ -149,18 +149,22 @@ impl<'a> CurveGroup<'a> {
                 state.disputed_samples += positions.len();
                 state.is_traced = false;
                 search.request(positions, &self.span);
-                self.advance(curve, rank, &mut batch);
+                self.request_trials(curve, rank, &mut batch);
             }
         }
         batch
     }
 
     /// Adds the trials that a line needs next to the batch.
-    fn advance(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
-        let first = self.first_values[self.lines[rank].index];
+    fn request_trials(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
+        let first = self.first_values[self.lines[rank].value_index];
         for position in self.next_positions(curve, rank) {
             let second = self.search.value(position);
-            let trial = BoundaryTrial { curve: self.first_curve + curve, first, second };
+            let trial = BoundaryTrial {
+                curve_index: self.first_curve + curve,
+                first_value: first,
+                second_value: second,
+            };
             batch.push(TrialRequest { trial, curve, rank, position });
         }
     }
@@ -188,7 +192,7 @@ impl<'a> CurveGroup<'a> {
         state.intervals = Some(search.intervals(&span));
         if self.lines[rank].is_lattice_line() {
             let min_gap = (MIN_GAP_FRACTION * self.cell_width).max(span.tolerance);
-            search.request(lipschitz::candidates(search.samples(), min_gap), &span);
+            search.request(lipschitz::candidate_positions(search.samples(), min_gap), &span);
         }
         let positions = search.take_positions(&span);
         state.is_traced = positions.is_empty();
@@ -196,7 +200,7 @@ impl<'a> CurveGroup<'a> {
     }
 
     /// Whether all brackets are narrow on the parents of a line.
-    fn may_begin(&self, curve: usize, rank: usize) -> bool {
+    fn can_begin(&self, curve: usize, rank: usize) -> bool {
         let mut parents = self.lines[rank].parents.iter().flatten();
         parents.all(|parent| self.neighbour(curve, *parent).is_some())
     }
@@ -210,7 +214,7 @@ impl<'a> CurveGroup<'a> {
         };
         let parents = line.parents.each_ref().map(find_parents);
         let mut search = LineSearch::default();
-        let predicted = predict(line.position, &parents, self.cell_width, &self.span);
+        let predicted = predict_sides(line.position, &parents, self.cell_width, &self.span);
         match &predicted {
             Some(sides) => {
                 search.request(sides.iter().map(|predicted| predicted.position), &self.span)
@@ -237,13 +241,17 @@ impl<'a> CurveGroup<'a> {
                 continue;
             }
             let Some(search) = &state.search else { continue };
-            let Some(line) = self.neighbour(curve, rank) else { continue };
+            let Some(own_line) = self.neighbour(curve, rank) else { continue };
             let mut positions = Vec::new();
             for step in [-1, 1] {
                 let neighbour_at = |offset| self.neighbour(curve, rank.checked_add_signed(offset)?);
                 let Some(neighbour) = neighbour_at(step) else { continue };
-                let pair = LinePair { line, neighbour, second_neighbour: neighbour_at(2 * step) };
-                for interval in pair.find_disputed(self.cell_width, &self.span) {
+                let pair = LinePair {
+                    line: own_line,
+                    neighbour,
+                    second_neighbour: neighbour_at(2 * step),
+                };
+                for interval in pair.find_disputed_intervals(self.cell_width, &self.span) {
                     let width = interval[1] - interval[0];
                     let max_gap = DISPUTED_FRACTION * self.cell_width.min(width);
                     let max_gap = max_gap.max(0.5 * self.span.tolerance);
@@ -257,35 +265,35 @@ impl<'a> CurveGroup<'a> {
         disputes
     }
 
-    fn insert(&mut self, request: &TrialRequest, distance: Option<f64>) {
+    fn insert_distance(&mut self, request: &TrialRequest, distance: Option<f64>) {
         let distance = distance.filter(|distance| !distance.is_nan());
         if let Some(search) = &mut self.curves[request.curve][request.rank].search {
             search.insert(LineSample { position: request.position, distance });
         }
     }
 
-    fn lines_traced(&self) -> usize {
+    fn count_traced_lines(&self) -> usize {
         self.curves.iter().flatten().filter(|state| state.is_traced).count()
     }
 
     /// Returns the traced rows of every curve, in the order of the first axis's values.
-    fn finish(self) -> Vec<Vec<BoundaryRow>> {
-        let value = |position: f64| self.search.value(position);
+    fn into_rows(self) -> Vec<Vec<BoundaryRow>> {
+        let axis_value = |position: f64| self.search.value(position);
         let mut ranks: Vec<usize> = (0..self.lines.len()).collect();
-        ranks.sort_by_key(|rank| self.lines[*rank].index);
-        let mut curves = Vec::with_capacity(self.curves.len());
+        ranks.sort_by_key(|rank| self.lines[*rank].value_index);
+        let mut rows_by_curve = Vec::with_capacity(self.curves.len());
         for states in &self.curves {
             let mut rows = Vec::with_capacity(ranks.len());
             for &rank in &ranks {
                 let Some(search) = &states[rank].search else { continue };
                 rows.push(BoundaryRow {
-                    first: self.first_values[self.lines[rank].index],
-                    side_changes: search.side_changes(&self.span, &value),
-                    trials: search.samples().len(),
+                    first_value: self.first_values[self.lines[rank].value_index],
+                    side_changes: search.side_changes(&self.span, &axis_value),
+                    trial_count: search.samples().len(),
                 });
             }
-            curves.push(rows);
+            rows_by_curve.push(rows);
         }
-        curves
+        rows_by_curve
     }
 }

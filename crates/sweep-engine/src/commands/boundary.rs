@@ -9,7 +9,7 @@ use super::grid::resume_command;
 use super::{GridArgs, Lines as _, format_number, install_interrupt};
 use crate::boundary::quantity::traceable_columns;
 use crate::boundary::{
-    BoundaryOptions, BoundaryRow, BoundaryTask, SideChangeKind, TracedBoundary, trace,
+    BoundaryOptions, BoundaryRow, BoundaryTask, SideChangeKind, TracedBoundary, trace_boundary,
 };
 use crate::config::section::format_count;
 use crate::evaluator::{CachedEvaluator, SearchStop};
@@ -76,7 +76,7 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
-    let stored_points = trials.count() as u64;
+    let stored_points = trials.trial_count() as u64;
     if stored_points > 0 {
         tell(&format!("going on: {} there", format_count(stored_points as usize, "point")));
     }
@@ -84,7 +84,7 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     let execution = args.execution.with_interrupt(&interrupt);
     let (boundary, trials) = search(&task, Some(trials), execution)?;
     let Some(boundary) = boundary else {
-        let stored_points = format_count(trials.map_or(0, |trials| trials.count()), "point");
+        let stored_points = format_count(trials.map_or(0, |trials| trials.trial_count()), "point");
         let wall = format_duration(start.elapsed().as_secs_f64());
         let mut text =
             format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
@@ -138,17 +138,17 @@ fn format_summary<M: Model>(
     boundary: &TracedBoundary,
     wall_s: f64,
 ) -> String {
-    let BoundaryTask { plan, quantity, search, .. } = task;
+    let BoundaryTask { plan, quantity, range: search, .. } = task;
     let grid_points: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
         "{}: {} traced with {} (the grid has {grid_points}) in {}, {}\n",
         plan.name,
         describe_limit(&quantity.name, quantity.limit),
-        format_count(boundary.trials, "point"),
-        format_count(boundary.rounds, "round"),
+        format_count(boundary.trial_count, "point"),
+        format_count(boundary.batch_count, "round"),
         format_duration(wall_s)
     );
-    let rows = || boundary.curves.iter().flatten();
+    let rows = || boundary.rows_by_curve.iter().flatten();
     let count_kind = |row: &BoundaryRow, kind| {
         row.side_changes.iter().filter(|side_change| side_change.kind == kind).count()
     };
@@ -165,12 +165,12 @@ fn format_summary<M: Model>(
     }
     let brackets =
         rows().flat_map(|row| &row.side_changes).filter_map(|side_change| side_change.bracket);
-    let bracket_width = |[low, high]: [f64; 2]| match search.second_log {
+    let bracket_width = |[low, high]: [f64; 2]| match search.is_second_log {
         true => (high / low).ln(),
         false => high - low,
     };
     if let Some(widest) = brackets.map(bracket_width).reduce(f64::max) {
-        let unit = match search.second_log {
+        let unit = match search.is_second_log {
             true => "of its value",
             false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit),
         };
@@ -178,7 +178,7 @@ fn format_summary<M: Model>(
         let tolerance = format_number(search.tolerance);
         text.line("brackets", format!("at most {widest} {unit} wide (tolerance: {tolerance})"));
     }
-    let cell_sizes = task.cell().into_iter().zip(&plan.axes);
+    let cell_sizes = task.max_cell_size().into_iter().zip(&plan.axes);
     let cell: Vec<String> =
         cell_sizes.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit)).collect();
     let cell = cell.join(" by ");
@@ -211,19 +211,24 @@ pub fn search<M: Model>(
     trials: Option<Trials>,
     execution: Execution<'_>,
 ) -> Result<(Option<TracedBoundary>, Option<Trials>), Error> {
-    let stored_points = trials.as_ref().map_or(0, |trials| trials.count() as u64);
-    let rows = (task.first_values.len() * task.curves) as u64;
+    let stored_points = trials.as_ref().map_or(0, |trials| trials.trial_count() as u64);
+    let rows = (task.first_values.len() * task.curve_count) as u64;
     let rows_done = AtomicU64::new(0);
     let progress = Progress::for_search(execution.progress, rows, "rows", stored_points);
     let show_points = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let threads = execution.threads()?;
-    let engine = M::engine(&task.plan, task.column())?;
+    let engine = M::engine(&task.plan, task.column_name())?;
     let evaluator =
         CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_points)?;
     let mut record_rows_done = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
-    let distances = task.distances(&evaluator);
-    let boundary =
-        trace(&distances, &task.first_values, task.curves, &task.search, &mut record_rows_done);
+    let distances = task.distance_evaluator(&evaluator);
+    let boundary = trace_boundary(
+        &distances,
+        &task.first_values,
+        task.curve_count,
+        &task.range,
+        &mut record_rows_done,
+    );
     drop(distances);
     progress.finish();
     Ok((SearchStop::interrupted_to_none(boundary)?, evaluator.into_cache()))

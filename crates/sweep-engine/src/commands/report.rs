@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::show::ModelSummary;
 use super::{conditions, format_cell, format_number};
 use crate::columns::MODELS;
-use crate::store::read::{Tally, tally};
+use crate::store::read::{Tally, tally_rows};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, GridInput, Model, Plan, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
@@ -70,7 +70,7 @@ pub fn run<M: Model>(
 
     let question = escape(&args.question);
     let mut body = format!("<header><h1>{question}</h1><p>{}</p></header>\n", escape(name));
-    let tally = tally(file.file())?;
+    let tally = tally_rows(file.file())?;
     let limits = ratio_limits(&plan);
     // Rows without a verdict count on neither side, as in share().
     let points_with_verdict = tally.points.saturating_sub(tally.undefined);
@@ -85,9 +85,8 @@ pub fn run<M: Model>(
         limits.filter(|_| *over_estimated > 0).map_or_else(String::new, describe_over_estimates);
     body += &format!(
         "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {points_with_verdict} points with a \
-         verdict are \
-         reliable: every ratio of the nonlinear model to the linear one is {range}. Of all \
-         {points} points, {sensitive} are chaotic, and {undefined} have no \
+         verdict are reliable: every ratio of the nonlinear model to the linear one is {range}. Of \
+         all {points} points, {sensitive} are chaotic, and {undefined} have no \
          verdict.{over_estimate_note}</p>\n"
     );
     let headings = ["", "worst", "limit", "at"];

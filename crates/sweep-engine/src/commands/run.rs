@@ -343,8 +343,13 @@ pub fn count_lines_at(
     if let Some(greatest) = &tally.greatest_ratio {
         text.line("greatest", format!("ratio {:.3}{}", greatest.value, location(greatest.point)));
     }
-    for ColumnExtreme { column, worse, limit, rows_beyond_limit: rows_beyond, worst } in
-        &tally.extremes
+    for ColumnExtreme {
+        column,
+        worse,
+        limit,
+        rows_beyond_limit: rows_beyond,
+        worst_value: worst,
+    } in &tally.extremes
     {
         let Some(worst) = worst else { continue };
         let mut words = format!("{column} {}{}", format_number(worst.value), location(worst.point));
@@ -448,8 +453,13 @@ mod tests {
             let worst = Some(Extreme { value: 2.5, point: 0 });
             let column = "speed_off".to_owned();
             let limit = Some(2.0);
-            let extreme =
-                ColumnExtreme { column, worse: Worse::Greater, limit, rows_beyond_limit, worst };
+            let extreme = ColumnExtreme {
+                column,
+                worse: Worse::Greater,
+                limit,
+                rows_beyond_limit,
+                worst_value: worst,
+            };
             let tally = Tally { extremes: vec![extreme], ..Tally::default() };
             count_lines_at(&tally, 2.0.into(), &|_| String::new())
         };

@@ -10,8 +10,8 @@ use super::run::{count_lines_at, format_named_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
 };
-use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, read_overview, tally};
-use crate::store::{Holder, UnfinishedWork, find_unfinished, refuse_unfinished};
+use crate::store::read::{ColumnRange, FileOverview, ResultFile, Tally, read_overview, tally_rows};
+use crate::store::{LockHolder, UnfinishedWork, find_unfinished, refuse_unfinished};
 use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
@@ -130,7 +130,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
             } else if !parquet_file.is_sealed() {
                 text.line("checked", "no: it carries no digest, as files of older builds do not");
             }
-            let tally = tally(&parquet_file)?;
+            let tally = tally_rows(&parquet_file)?;
             let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
             let locations = extreme_locations(&parquet_file, result, &tally)?;
             let axis_values = |point| {
@@ -170,7 +170,7 @@ fn format_progress(unfinished_work: &UnfinishedWork) -> String {
     text.line("state", format!("unfinished: {}", unfinished_work.progress()));
     text.line("name", &unfinished_work.name);
     text.line("kept in", unfinished_work.folder.display());
-    for Holder { pid, host, shard } in &unfinished_work.running {
+    for LockHolder { pid, host, shard } in &unfinished_work.running {
         let shard = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
         text.line("running", format!("process {pid} on {host}{shard}"));
     }
@@ -237,14 +237,14 @@ fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>
 }
 
 /// Returns the content of the text as JSON, with the whole plan.
-fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &Overview) -> Result<Value, Error> {
+fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &FileOverview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
         let counts = || column.word_counts.iter().cloned().collect::<Value>();
         json!({
             "name": column.name,
             "unit": Some(&column.metadata.unit).filter(|unit| !unit.is_empty()),
             "worse": column.metadata.worse.map(Worse::name),
-            "nulls": column.nulls,
+            "nulls": column.null_count,
             "least": column.range.map(|(least, _)| Cell::Number(least)),
             "greatest": column.range.map(|(_, greatest)| Cell::Number(greatest)),
             "counts": (!column.word_counts.is_empty()).then(counts),
@@ -252,7 +252,7 @@ fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &Overview) -> Result<V
     };
     let mut json = json!({
         "file": args.file.display().to_string(),
-        "rows": overview.rows,
+        "rows": overview.row_count,
         "made_by": file.created_by(),
         "is_sealed": file.is_sealed(),
         "columns": overview.columns.iter().map(column).collect::<Value>(),
@@ -260,7 +260,7 @@ fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &Overview) -> Result<V
         "plan": file.json(key::PLAN),
     });
     if let Some(result) = &overview.result {
-        let tally = tally(file)?;
+        let tally = tally_rows(file)?;
         let locations = extreme_locations(file, result, &tally)?;
         let locations = locations
             .into_iter()
@@ -282,7 +282,7 @@ fn extreme_locations(
 ) -> Result<Vec<(u64, Vec<(String, f64)>)>, Error> {
     let axes: Vec<&str> =
         plan_axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
-    let worst_of_columns = tally.extremes.iter().filter_map(|column| column.worst.as_ref());
+    let worst_of_columns = tally.extremes.iter().filter_map(|column| column.worst_value.as_ref());
     let extreme_points: Vec<u64> =
         tally.greatest_ratio.iter().chain(worst_of_columns).map(|extreme| extreme.point).collect();
     let mut locations = Vec::new();
@@ -352,8 +352,8 @@ fn plan_axes(plan: &Value) -> &[Value] {
 
 /// Adds lines about columns with their units and ranges: all columns, or those of metrics and the
 /// number of others.
-fn add_columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
-    text.line("rows", file.rows);
+fn add_columns(text: &mut String, file: &FileOverview, all: bool, is_shown: fn(&str) -> bool) {
+    text.line("rows", file.row_count);
     let shown_columns: Vec<&ColumnRange> =
         file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
     let width = shown_columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
@@ -378,8 +378,8 @@ fn describe_range(column: &ColumnRange) -> String {
     }
     let names = column.word_counts.iter();
     parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));
-    if column.nulls > 0 {
-        parts.push(format!("{} null", column.nulls));
+    if column.null_count > 0 {
+        parts.push(format!("{} null", column.null_count));
     }
     parts.join(", ")
 }

@@ -22,15 +22,15 @@ impl<'a> NamedArgument<'a> {
     /// Splits an option's argument.
     pub fn read(option: &str, argument: &'a str, report: &'a Report) -> Option<Self> {
         let source = report.add(option, argument);
-        let located = |value: &'a str, span| Located {
+        let locate = |value: &'a str, span| Located {
             value: value.trim(),
             location: Location::new(source, span),
         };
         match argument.split_once('=') {
             Some((name, value)) => {
                 let equals = name.len();
-                let name = located(name, 0..equals);
-                Some(Self { name, value: located(value, equals + 1..argument.len()), report })
+                let name = locate(name, 0..equals);
+                Some(Self { name, value: locate(value, equals + 1..argument.len()), report })
             }
             None => {
                 let title = format!("`{}` is not a constant", shorten(argument));
@@ -78,9 +78,9 @@ impl<'a> NamedArgument<'a> {
     /// Parses words separated by commas, each once and at least one.
     pub fn list(&self, noun: &str, all: &[&str]) -> Option<Vec<&'a str>> {
         let Located { value, location } = &self.value;
-        let parts =
+        let words =
             value.split(',').map(|part| Located { value: part.trim(), location: location.clone() });
-        let (valid_words, are_all_valid) = check_words(parts, noun, all, self.report);
+        let (valid_words, are_all_valid) = check_words(words, noun, all, self.report);
         are_all_valid.then_some(valid_words)
     }
 }

@@ -24,13 +24,13 @@ fn record_written_numbers<M: Model>(
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
-    let parts = &parameter.parts;
-    if !written_numbers.record(name, parts.clone(), report) {
+    let number_names = &parameter.parts;
+    if !written_numbers.record(name, number_names.clone(), report) {
         return false;
     }
     // The constant has an effect on a tolerance, as its nominal value.
     for constant in draft.constants.iter().filter(|_| !has_tolerance) {
-        if constant.parameter.parts.iter().all(|part| parts.contains(part)) {
+        if constant.parameter.parts.iter().all(|part| number_names.contains(part)) {
             let title = format!(
                 "`{}` is swept by an axis: this constant has no effect",
                 constant.name.value
@@ -45,9 +45,11 @@ fn record_written_numbers<M: Model>(
 
 /// Returns whether options fix all numbers of an axis, so that it sweeps nothing.
 fn is_fixed<M: Model>(swept_parameter: &ModelParameter<M>, draft: &Draft<'_, M>) -> bool {
-    let parts = &swept_parameter.parts;
-    let mut options = draft.constants.iter().filter(|constant| constant.overrides_file);
-    options.any(|constant| parts.iter().all(|part| constant.parameter.parts.contains(part)))
+    let number_names = &swept_parameter.parts;
+    let mut overriding_constants =
+        draft.constants.iter().filter(|constant| constant.overrides_file);
+    overriding_constants
+        .any(|constant| number_names.iter().all(|part| constant.parameter.parts.contains(part)))
 }
 
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
@@ -70,7 +72,7 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
             report.refuse::<()>(&location, title, expected);
         }
     }
-    let mut points: Option<u64> = Some(1);
+    let mut point_count: Option<u64> = Some(1);
     for section in sections {
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
@@ -90,28 +92,31 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
             continue;
         }
         if design.is_none() {
-            let count = values.as_ref().map_or(1, |values| values.value.values.len());
-            let product = points.and_then(|points| points.checked_mul(count));
-            let product = product.filter(|&points| points <= MAX_POINTS);
-            if let (Some(points), None, Some(values)) = (points, product, &values) {
-                let title =
-                    format!("too many grid points: {points} before this axis, times {count}");
+            let value_count = values.as_ref().map_or(1, |values| values.value.values.len());
+            let new_point_count =
+                point_count.and_then(|point_count| point_count.checked_mul(value_count));
+            let new_point_count = new_point_count.filter(|&point_count| point_count <= MAX_POINTS);
+            if let (Some(point_count), None, Some(values)) = (point_count, new_point_count, &values)
+            {
+                let title = format!(
+                    "too many grid points: {point_count} before this axis, times {value_count}"
+                );
                 let expected = format!("expected at most {MAX_POINTS} in all");
                 report.refuse::<()>(&values.location, title, expected);
             }
-            points = product;
+            point_count = new_point_count;
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
             && record_written_numbers(&name, &parameter, &mut written_numbers, has_tolerance, draft)
-            && let (Some(Located { value, location }), Some(_)) = (values, points)
+            && let (Some(Located { value, location }), Some(_)) = (values, point_count)
         {
             let ValuesWithTolerance { values, tolerance } = value;
             add_axis(Axis { parameter, values, tolerance }, location, draft);
         }
     }
     // A plan whose axes are all fixed is a single point.
-    let is_point = draft.plan.axes.is_empty();
-    draft.plan.design = design.filter(|_| !is_point);
+    let has_one_value = draft.plan.axes.is_empty();
+    draft.plan.design = design.filter(|_| !has_one_value);
 }
 
 /// Adds an axis to the plan.
@@ -218,12 +223,12 @@ impl<'p> SweptParameter<'p> {
     /// Reads `tolerance`: a range about the model's own number, as a distance in the parameter's
     /// unit or in percent of the number.
     fn tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
-        section.text_or_number("tolerance").and_then(|found| {
+        section.text_or_number("tolerance").and_then(|tolerance_text| {
             let report = section.report;
-            let location = found.location;
-            let text = found.value.trim();
-            let percent = text.strip_suffix('%').map(str::trim_end);
-            let number = percent.unwrap_or(text).parse().ok();
+            let location = tolerance_text.location;
+            let text = tolerance_text.value.trim();
+            let percent_text = text.strip_suffix('%').map(str::trim_end);
+            let number = percent_text.unwrap_or(text).parse().ok();
             let Some(number) = number.filter(|number| Range::Positive.contains(*number)) else {
                 let title = format!("`tolerance` = \"{}\" is no tolerance", shorten(text));
                 let expected = "expected a positive number in the parameter's unit, or percent of \
@@ -241,13 +246,13 @@ impl<'p> SweptParameter<'p> {
                 return report.refuse(&location, title, expected);
             };
             // This order of operations is exact for round numbers: 120 less 5 % is 114.
-            let [from, to] = match percent {
+            let [from, to] = match percent_text {
                 Some(_) => [100.0 - number, 100.0 + number].map(|part| nominal * part / 100.0),
                 None => [nominal - number, nominal + number],
             };
             let [from, to] = [from.min(to), from.max(to)];
-            for end in [from, to] {
-                check_number(&quote(self.name), end, location.clone(), self.range, report)?;
+            for range_end in [from, to] {
+                check_number(&quote(self.name), range_end, location.clone(), self.range, report)?;
             }
             if from == to {
                 let title = format!("`{}` is 0, and so is every percentage of it", self.name);
@@ -257,7 +262,7 @@ impl<'p> SweptParameter<'p> {
                     "expected a tolerance in the parameter's unit",
                 );
             }
-            let tolerance = match percent {
+            let tolerance = match percent_text {
                 Some(_) => AxisTolerance::Percent(number),
                 None => AxisTolerance::Distance(number),
             };
@@ -293,8 +298,8 @@ const TOLERANCE_DEVIATIONS: f64 = 3.0;
 
 impl ToleranceRange {
     /// Returns evenly spaced values with both ends.
-    const fn read_values(self, count: u64) -> ValuesWithTolerance {
-        let values = AxisValues::Linear { from: self.from, to: self.to, count };
+    const fn read_values(self, value_count: u64) -> ValuesWithTolerance {
+        let values = AxisValues::Linear { from: self.from, to: self.to, count: value_count };
         ValuesWithTolerance { values, tolerance: Some(self.tolerance) }
     }
 
@@ -327,10 +332,10 @@ fn read_distribution(
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
     let kind = kind.map(|kind| kind.value);
-    let number = |key, range, is_required: bool| {
+    let read_number = |key, range, is_required: bool| {
         let field = section.number(key, range);
         let field = section.report_if_missing(field, key, is_required.then_some("a number"));
-        field.into_located().map(|number| number.value)
+        field.into_located().map(|read_number| read_number.value)
     };
     let field = swept_parameter.tolerance(&section);
     let mut tolerance = None;
@@ -340,7 +345,7 @@ fn read_distribution(
         let keys = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
         let keys = keys.iter().flat_map(|(_, numbers)| *numbers);
         let numbers: Vec<_> =
-            keys.map(|&(key, range)| number(key, range, kind.is_some())).collect();
+            keys.map(|&(key, range)| read_number(key, range, kind.is_some())).collect();
         let shape = match (kind, numbers.as_slice()) {
             (Some(0), &[Some(mean), Some(sd)]) => Some(DistributionShape::Normal { mean, sd }),
             (Some(1), &[Some(median), Some(sigma)]) => {
@@ -348,7 +353,7 @@ fn read_distribution(
             }
             _ => None,
         };
-        let [from, to] = ["from", "to"].map(|key| number(key, range, kind == Some(2)));
+        let [from, to] = ["from", "to"].map(|key| read_number(key, range, kind == Some(2)));
         section.finish();
         let bounds = match shape {
             Some(shape) => [
@@ -425,7 +430,7 @@ fn read_design_values(
     section.misplace(&["values"], misplacement_reason);
     let tolerance = swept_parameter.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["range", "distribution"], TOLERANCE_EXCLUDES);
+        section.misplace(&["range", "distribution"], MISPLACED_BESIDE_TOLERANCE);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
         let Located { value: range, location } = tolerance.into_located()?;
         return Some(Located { value: range.read_values(2), location });
@@ -446,7 +451,8 @@ fn read_design_values(
 }
 
 /// The reason for rejecting other keys beside a tolerance.
-const TOLERANCE_EXCLUDES: &str = "`tolerance` gives the ends, about the machine's own number";
+const MISPLACED_BESIDE_TOLERANCE: &str =
+    "`tolerance` gives the ends, about the machine's own number";
 
 /// Minimum distance between neighbouring values, as a share of the greater end. Basis: closer
 /// values could round to the same number. Doubling it halves the greatest number of values in a
@@ -468,23 +474,23 @@ fn read_values(
     let range = swept_parameter.range;
     let tolerance = swept_parameter.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["values", "range"], TOLERANCE_EXCLUDES);
+        section.misplace(&["values", "range"], MISPLACED_BESIDE_TOLERANCE);
         let expected = "the number of values, both ends included";
-        let count = section.whole_number("count", &(2..=MAX_POINTS));
-        let count = section.require(count, "count", expected);
+        let value_count = section.whole_number("count", &(2..=MAX_POINTS));
+        let value_count = section.require(value_count, "count", expected);
         let Located { value: range, location } = tolerance.into_located()?;
-        let count = count?.value;
+        let value_count = value_count?.value;
         if let Some(max_count) =
-            max_distinct_values(range.from, range.to).filter(|&max_count| max_count < count)
+            max_distinct_values(range.from, range.to).filter(|&max_count| max_count < value_count)
         {
-            let title = format!("a tolerance has no {count} different values");
+            let title = format!("a tolerance has no {value_count} different values");
             return section.report.refuse(
                 &location,
                 title,
                 format!("expected at most {max_count}"),
             );
         }
-        return Some(Located { value: range.read_values(count), location });
+        return Some(Located { value: range.read_values(value_count), location });
     }
     let value_list = section.valid_numbers("values", range);
     let range_section = section.table("range", "range = { from, to, count }");
@@ -571,18 +577,19 @@ pub fn read_range(
     let to = to?;
     let count = count?;
     let is_logarithmic = is_logarithmic? == 1;
-    let is_point = from.value == to.value;
+    let has_one_value = from.value == to.value;
     let is_design = points.is_some();
-    let [low, high] = [from.value, to.value].map(decimal);
-    if is_point && is_design {
-        let title = format!("a design cannot spread points from {low} to {high}");
+    let [from_text, to_text] = [from.value, to.value].map(decimal);
+    if has_one_value && is_design {
+        let title = format!("a design cannot spread points from {from_text} to {to_text}");
         return report.refuse(&to.location, title, "expected another number");
     }
-    if is_point && count.value > 1 {
-        let title = format!("a range from {low} to {high} has one value, not {}", count.value);
+    if has_one_value && count.value > 1 {
+        let title =
+            format!("a range from {from_text} to {to_text} has one value, not {}", count.value);
         return report.refuse(&to.location, title, "expected another number, or count = 1");
     }
-    if !is_point && !is_design && count.value == 1 {
+    if !has_one_value && !is_design && count.value == 1 {
         let title = "one value cannot be both ends of a range";
         return report.refuse(&count.location, title, "expected at least 2");
     }
@@ -595,7 +602,10 @@ pub fn read_range(
     if let Some(max_count) =
         max_distinct_values(from.value, to.value).filter(|&max_count| max_count < count.value)
     {
-        let title = format!("a range from {low} to {high} has no {} different values", count.value);
+        let title = format!(
+            "a range from {from_text} to {to_text} has no {} different values",
+            count.value
+        );
         if is_design {
             let expected = "expected ends farther apart, or fewer `points` in [design]";
             return report.refuse(&to.location, title, expected);

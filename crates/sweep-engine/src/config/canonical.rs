@@ -46,28 +46,28 @@ fn axis_to_json<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
         // The values are columns of the result, and the design's hash covers them.
         return json!({ "parameter": parameter });
     }
-    let range = |from: f64, to: f64, count: u64, spacing: &str| {
-        let mut range = json!({ "from": from, "to": to, "spacing": spacing });
+    let range_to_json = |from: f64, to: f64, count: u64, spacing: &str| {
+        let mut range_to_json = json!({ "from": from, "to": to, "spacing": spacing });
         if design.is_none() {
-            range["count"] = count.into();
+            range_to_json["count"] = count.into();
         }
-        json!({ "parameter": parameter, "range": range })
+        json!({ "parameter": parameter, "range": range_to_json })
     };
-    let mut json = match axis.values {
+    let mut axis_json = match axis.values {
         AxisValues::List(ref values) => json!({ "parameter": parameter, "values": values }),
         AxisValues::Distributed(ref distribution) => {
             let Distribution { shape, from, to } = *distribution;
-            let mut json = json!({ "kind": shape.name(), "from": from, "to": to });
+            let mut axis_json = json!({ "kind": shape.name(), "from": from, "to": to });
             for (key, number) in shape.numbers() {
-                json[key] = number.into();
+                axis_json[key] = number.into();
             }
-            json!({ "parameter": parameter, "distribution": json })
+            json!({ "parameter": parameter, "distribution": axis_json })
         }
-        AxisValues::Linear { from, to, count } => range(from, to, count, "linear"),
-        AxisValues::Log { from, to, count } => range(from, to, count, "log"),
+        AxisValues::Linear { from, to, count } => range_to_json(from, to, count, "linear"),
+        AxisValues::Log { from, to, count } => range_to_json(from, to, count, "log"),
     };
     if let Some(tolerance) = axis.tolerance {
-        json["tolerance"] = tolerance.to_json();
+        axis_json["tolerance"] = tolerance.to_json();
     }
-    json
+    axis_json
 }

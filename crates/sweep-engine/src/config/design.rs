@@ -17,8 +17,8 @@ const MAX_SOBOL_POINTS: u64 = 1 << 32;
 /// Walks over the section. After reading, a list has no points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.walk_table(Key::new("design", ""), |keys| {
-        let rules = DesignRule::ALL.map(|(_, name, description)| (name, description));
-        let words = [&rules[..], &[("list", "points as listed")]].concat();
+        let rule_words = DesignRule::ALL.map(|(_, name, description)| (name, description));
+        let words = [&rule_words[..], &[("list", "points as listed")]].concat();
         let current_rule = design.as_ref().map(Design::method);
         let current_rule = words.iter().position(|(name, _)| Some(*name) == current_rule);
         let key =
@@ -65,12 +65,12 @@ fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
 
 fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     keys.misplace(&["file"], "only the method \"list\" has it");
-    let numbers = match design {
+    let points_and_seed = match design {
         Some(Design::Spread { points, seed, .. }) => Some((*points, *seed)),
         Some(Design::List { .. }) | None => None,
     };
     // Placeholders for rejected numbers let the axes be read.
-    let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
+    let (mut points, mut seed) = points_and_seed.unwrap_or((1, DEFAULT_SEED));
     let max_points = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
     let key =
         Key::new("points", "the number of points").required("the number of points").settable();
@@ -78,7 +78,7 @@ fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_
     let key = Key::new("seed", "the seed of the random positions").settable();
     let seed_field = keys.walk_key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
     for (name, field) in [("points", points_field), ("seed", seed_field)] {
-        if let (None, Field::Present(_)) = (numbers, field) {
+        if let (None, Field::Present(_)) = (points_and_seed, field) {
             let title =
                 format!("`{name}` belongs to a design, and this grid has none that takes it");
             keys.refuse(name, &title, "expected a grid file with [design]");

@@ -122,7 +122,7 @@ impl NumberArray {
                 section.report.push(self.help.into_iter().fold(refusal, Diagnostic::with_help));
                 return None;
             }
-            let record = |(k, number): (usize, Located<f64>)| {
+            let record_number = |(k, number): (usize, Located<f64>)| {
                 let model_file_key = self.location_keys.get(k).cloned();
                 section.report.record_location(
                     model_file_key.unwrap_or_else(|| format!("{location_key}[{k}]")),
@@ -130,7 +130,7 @@ impl NumberArray {
                 );
                 number.value
             };
-            let value = found.value.into_iter().enumerate().map(record).collect();
+            let value = found.value.into_iter().enumerate().map(record_number).collect();
             Some(Located { value, location: found.location })
         })
     }
@@ -138,12 +138,18 @@ impl NumberArray {
 
 /// Returns the schema of a number in a range.
 pub fn number_schema(range: Range) -> Value {
-    let largest = Range::LARGEST;
+    let max_magnitude = Range::LARGEST;
     match range {
-        Range::Any => json!({ "type": "number", "minimum": -largest, "maximum": largest }),
-        Range::Positive => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": largest }),
-        Range::NonNegative => json!({ "type": "number", "minimum": 0, "maximum": largest }),
-        Range::Negative => json!({ "type": "number", "minimum": -largest, "exclusiveMaximum": 0 }),
+        Range::Any => {
+            json!({ "type": "number", "minimum": -max_magnitude, "maximum": max_magnitude })
+        }
+        Range::Positive => {
+            json!({ "type": "number", "exclusiveMinimum": 0, "maximum": max_magnitude })
+        }
+        Range::NonNegative => json!({ "type": "number", "minimum": 0, "maximum": max_magnitude }),
+        Range::Negative => {
+            json!({ "type": "number", "minimum": -max_magnitude, "exclusiveMaximum": 0 })
+        }
         Range::Within(least, greatest) => {
             json!({ "type": "number", "minimum": least, "maximum": greatest })
         }

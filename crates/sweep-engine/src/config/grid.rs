@@ -38,9 +38,10 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
     let mut keys = Keys::new(KeyWalk::Read(root));
     let mut draft = Draft { plan: Plan::blank(), report, constants: Vec::new() };
     walk_sections(&mut draft.plan, &mut keys, Some(input));
-    let names = describe_keys::<M>().settable_keys;
-    let (options, sets): (Vec<&String>, _) =
-        sets.iter().partition(|set| set.contains('=') && names.contains(&argument_name(set)));
+    let settable_names = describe_keys::<M>().settable_keys;
+    let (options, sets): (Vec<&String>, _) = sets
+        .iter()
+        .partition(|set| set.contains('=') && settable_names.contains(&argument_name(set)));
     parameters::set_constants(keys.section()?, sets, at_arguments, &mut draft);
     draft.plan.reading_notes.columns = read_columns(keys.section()?);
     let design_field = design::walk(&mut draft.plan.design, &mut keys);
@@ -48,13 +49,15 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
     match (design_field, draft.plan.design.take()) {
         (_, Some(Design::List { file, .. })) => {
             let model = draft.plan.model.clone();
-            let known = |name: &str| {
+            let find_quantity = |name: &str| {
                 let parameter = model.find(name).ok()?;
                 Some((parameter.name.into_owned(), parameter.unit.to_owned()))
             };
-            let names =
-                list::ColumnNames { known: &known, renamed: &draft.plan.reading_notes.columns };
-            match list::read(&file, path, &names, report) {
+            let settable_names = list::ColumnNames {
+                known: &find_quantity,
+                renamed: &draft.plan.reading_notes.columns,
+            };
+            match list::read(&file, path, &settable_names, report) {
                 Some(list) => axes::add_list_axes(root, list, &mut draft),
                 None => drop(root.tables("axis")),
             }
@@ -76,11 +79,11 @@ fn read_columns(root: &Section<'_>) -> Vec<(String, String)> {
         return Vec::new();
     };
     let section = section.value;
-    let named_header = |header: Located<&str>| {
+    let header_and_name = |header: Located<&str>| {
         let name = section.text_named(header.value)?;
         Some((header.value.to_owned(), name.value.to_owned()))
     };
-    section.names().into_iter().filter_map(named_header).collect()
+    section.names().into_iter().filter_map(header_and_name).collect()
 }
 
 /// The keys of study files.
@@ -95,23 +98,25 @@ pub fn refuse_other_kind<M: Model>(
     source: SourceId,
     report: &Report,
 ) -> bool {
-    let grid = describe_keys::<M>().finish();
+    let grid_schema = describe_keys::<M>().finish();
     let has_key = |kind: &str, key: &str| match kind {
         "grid" => {
-            ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
+            ["set", "axis", "columns"].contains(&key)
+                || grid_schema["properties"].get(key).is_some()
         }
         "study" => STUDY_KEYS.contains(&key),
         _ => M::ABOUT.model_file.is_some_and(|file| file.keys.contains(&key)),
     };
-    let keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
+    let file_keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
     let is_kind = |kind: &&str| {
-        let keys_of_kind = keys.iter().filter(|key| has_key(kind, key)).count();
-        2 * keys_of_kind > keys.len()
-            && keys.iter().all(|key| has_key(kind, key) || !has_key(expected_kind, key))
+        let keys_of_kind = file_keys.iter().filter(|key| has_key(kind, key)).count();
+        2 * keys_of_kind > file_keys.len()
+            && file_keys.iter().all(|key| has_key(kind, key) || !has_key(expected_kind, key))
     };
     let model_file_key = M::ABOUT.model_file.map_or("", |file| file.key);
-    let kinds = [expected_kind, "grid", "study", model_file_key];
-    let Some(kind) = kinds.into_iter().find(is_kind).filter(|kind| *kind != expected_kind) else {
+    let file_kinds = [expected_kind, "grid", "study", model_file_key];
+    let Some(kind) = file_kinds.into_iter().find(is_kind).filter(|kind| *kind != expected_kind)
+    else {
         return false;
     };
     report.push_with(|sources| {

@@ -277,32 +277,35 @@ impl<'a> Keys<'a> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|item| name(*item).to_owned()).collect();
         let field = self.walk_key(key, &Form::Words(noun, &names), &mut words);
-        let find = |word: &String| all.iter().copied().find(|item| name(*item) == word);
-        *value = words.iter().filter_map(find).collect();
+        let find_by_name = |word: &String| all.iter().copied().find(|item| name(*item) == word);
+        *value = words.iter().filter_map(find_by_name).collect();
         field
     }
 
     /// Walks over a table under a key.
     pub fn walk_table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
         let name = key.name;
-        let keys = |inner| Keys { location_prefix: format!("{name}."), ..Keys::new(inner) };
+        let keys_of_table = |inner_description| Keys {
+            location_prefix: format!("{name}."),
+            ..Keys::new(inner_description)
+        };
         match &mut self.walk {
             KeyWalk::Read(root) => root
                 .report_if_missing(root.table(name, &format!("[{name}]")), name, key.expected)
                 .map(|section| {
                     root.report.record_location(name, section.location);
-                    let mut keys = keys(KeyWalk::Read(section.value));
-                    walk(&mut keys);
-                    keys.finish();
+                    let mut keys_of_table = keys_of_table(KeyWalk::Read(section.value));
+                    walk(&mut keys_of_table);
+                    keys_of_table.finish();
                 }),
             KeyWalk::Set(options) => {
-                walk(&mut keys(KeyWalk::Set(options)));
+                walk(&mut keys_of_table(KeyWalk::Set(options)));
                 Field::Absent
             }
             KeyWalk::Describe(description) => {
-                let inner = description.describe_inner(walk);
-                if inner != json!({}) {
-                    description.add(key, inner);
+                let inner_description = description.describe_inner(walk);
+                if inner_description != json!({}) {
+                    description.add(key, inner_description);
                 }
                 Field::Absent
             }

@@ -85,7 +85,7 @@ impl NumberTable {
     ) -> Self {
         let headers: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let (source, locations) = report.add_header(name, &headers);
-        let mut table = Vec::new();
+        let mut list_columns = Vec::new();
         for (index, ((header, values), location)) in columns.into_iter().zip(locations).enumerate()
         {
             let known_name = names.find(&header, None).unwrap_or_else(|[title, expected]| {
@@ -93,18 +93,26 @@ impl NumberTable {
                 None
             });
             let is_known = known_name.is_some();
-            let (value, values) = match known_name {
+            let (column_name, values) = match known_name {
                 Some(known_name) => {
-                    let values = values.into_iter().map(|value| known_name.scale.apply(value));
+                    let values =
+                        values.into_iter().map(|column_name| known_name.scale.apply(column_name));
                     (known_name.name, values.collect())
                 }
                 None => (header.clone(), Vec::new()),
             };
-            let name = Located { value, location };
-            table.push(ListColumn { name, header, index, is_known, values, is_clock: false });
+            let name = Located { value: column_name, location };
+            list_columns.push(ListColumn {
+                name,
+                header,
+                index,
+                is_known,
+                values,
+                is_clock: false,
+            });
         }
         Self {
-            columns: table,
+            columns: list_columns,
             row_locations: RowLocations::Binary(Location::new(source, 0..0)),
             preamble_lines: 0,
         }
@@ -146,17 +154,18 @@ impl NumberTable {
                 format_count(self.preamble_lines, "line")
             ));
         }
-        let ignored: Vec<String> = self
+        let ignored_columns: Vec<String> = self
             .columns
             .iter()
             .filter(|column| !column.is_known)
             .map(|column| quote(&column.header))
             .collect();
-        if !ignored.is_empty() {
-            let (named, ellipsis) = ignored.split_at(ignored.len().min(MAX_NAMED_COLUMNS));
+        if !ignored_columns.is_empty() {
+            let (named_columns, ellipsis) =
+                ignored_columns.split_at(ignored_columns.len().min(MAX_NAMED_COLUMNS));
             let ellipsis = if ellipsis.is_empty() { "" } else { ", ..." };
-            let columns = if ignored.len() == 1 { "the column" } else { "the columns" };
-            notes.push(format!("left out {columns} {}{ellipsis}", named.join(", ")));
+            let columns = if ignored_columns.len() == 1 { "the column" } else { "the columns" };
+            notes.push(format!("left out {columns} {}{ellipsis}", named_columns.join(", ")));
         }
         let renamed_columns = self
             .columns
@@ -231,7 +240,7 @@ fn shorten_path(path: &Path) -> String {
 /// `allows_missing`, a missing value is NaN; otherwise NaN marks a rejected value.
 fn read_table(
     path: &Path,
-    file: &Location,
+    file_location: &Location,
     allows_missing: bool,
     names: &ColumnNames<'_>,
     report: &Report,
@@ -244,7 +253,7 @@ fn read_table(
             parquet::read_columns(bytes, allows_missing, names)?.into_iter().enumerate()
         {
             let parquet::ParquetColumn { name, header, values, is_clock } = parquet_column;
-            let name = Located { value: name, location: file.clone() };
+            let name = Located { value: name, location: file_location.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
             columns.push(ListColumn { name, header, index, is_known, values, is_clock });
@@ -252,7 +261,7 @@ fn read_table(
         return Ok((
             NumberTable {
                 columns,
-                row_locations: RowLocations::Binary(file.clone()),
+                row_locations: RowLocations::Binary(file_location.clone()),
                 preamble_lines: 0,
             },
             hash,
@@ -293,14 +302,15 @@ pub(super) fn read(
             return report.refuse(&location, title, expected);
         }
     };
-    let points = table.columns.iter().map(|column| column.values.len()).max().unwrap_or_default();
-    if points == 0 && !report.is_clean() {
+    let point_count =
+        table.columns.iter().map(|column| column.values.len()).max().unwrap_or_default();
+    if point_count == 0 && !report.is_clean() {
         return None;
     }
     let is_parameter = |column: &ListColumn| column.is_known && column.name.value != ID_COLUMN;
     let has_parameter = table.columns.iter().any(is_parameter);
     let has_unknown = table.columns.iter().any(|column| !column.is_known);
-    if points == 0 && (has_parameter || !has_unknown) {
+    if point_count == 0 && (has_parameter || !has_unknown) {
         let title = format!("the list of points {path_text} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
         return report.refuse(&location, title, expected);
@@ -310,7 +320,7 @@ pub(super) fn read(
         let title = format!("the list of points {path_text} has no column but `{ID_COLUMN}`");
         return report.refuse(&location, title, "expected a column of a parameter");
     }
-    let design = Design::List { file: file.to_owned(), points: points as u64, hash };
+    let design = Design::List { file: file.to_owned(), points: point_count as u64, hash };
     Some(PointList { design, table })
 }
 

@@ -25,8 +25,8 @@ pub fn set_constants<M: Model>(
     if let Some(section) = root.table("set", "[set]").into_located() {
         let section = section.value;
         for name in section.names() {
-            let number = |range: Range| section.number_named(name.value, range);
-            constants.extend(read_constant(name.clone(), number, false, draft));
+            let read_number = |range: Range| section.number_named(name.value, range);
+            constants.extend(read_constant(name.clone(), read_number, false, draft));
         }
         apply(&constants, draft);
     }

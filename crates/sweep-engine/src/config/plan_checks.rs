@@ -12,13 +12,13 @@ use crate::{Model, ModelParameter};
 
 /// Reports a window that is invalid at a corner of the grid.
 pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
-    let mut reported = BTreeSet::new();
+    let mut reported_keys = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
-        if draft.report.is_full() || !reported.is_empty() {
+        if draft.report.is_full() || !reported_keys.is_empty() {
             break;
         }
         let window_s = draft.plan.window_at(&draft.plan.corner(corner));
-        check_window(draft, window_s, &mut reported);
+        check_window(draft, window_s, &mut reported_keys);
     }
 }
 
@@ -26,14 +26,14 @@ pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
 pub fn check_window<M: Model>(
     draft: &Draft<'_, M>,
     [from_s, to_s]: [f64; 2],
-    reported: &mut BTreeSet<Vec<String>>,
+    reported_keys: &mut BTreeSet<Vec<String>>,
 ) {
     let end_s = draft.plan.end_s;
     if from_s < to_s && to_s <= end_s {
         return;
     }
     let keys = ["window_from_s", "window_to_s", "time.end_s"].map(str::to_owned).to_vec();
-    if !reported.insert(keys.clone()) {
+    if !reported_keys.insert(keys.clone()) {
         return;
     }
     let [from_s, to_s, end_s] = [from_s, to_s, end_s].map(decimal);
@@ -72,10 +72,10 @@ fn find_locations<M: Model>(
     for location in axes.chain(keys.iter().filter_map(|key| draft.report.location(key))) {
         // Numbers on one line, such as a vector's, share a location.
         let line = sources.line(&location).number;
-        let same_line = locations
+        let location_on_line = locations
             .iter_mut()
             .find(|other| other.source == location.source && sources.line(other).number == line);
-        match same_line {
+        match location_on_line {
             Some(other) => {
                 other.span = other.span.start.min(location.span.start)
                     ..other.span.end.max(location.span.end);
@@ -90,12 +90,12 @@ fn find_locations<M: Model>(
 pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
-    let steps = end_s / step_s;
-    let [step, end] = [step_s, end_s].map(decimal);
+    let step_count = end_s / step_s;
+    let [step_text, end] = [step_s, end_s].map(decimal);
     let title = if step_s > end_s {
-        format!("a step of {step} s is longer than the whole run, {end} s")
-    } else if steps > MAX_STEPS {
-        format!("a step of {step} s makes {steps:.1e} steps to {end} s")
+        format!("a step of {step_text} s is longer than the whole run, {end} s")
+    } else if step_count > MAX_STEPS {
+        format!("a step of {step_text} s makes {step_count:.1e} steps to {end} s")
     } else {
         return;
     };

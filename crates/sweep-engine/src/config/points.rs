@@ -15,27 +15,28 @@ use crate::{Axis, Plan};
 /// range.
 pub fn check_columns<M: Model, V>(
     plan: &Plan<M>,
-    names: &[&str],
+    column_names: &[&str],
     values: impl Fn(usize) -> V,
 ) -> Result<Vec<Option<usize>>, Diagnostics>
 where
     V: Iterator<Item = Option<f64>>,
 {
     let report = Report::default();
-    let (source, header_locations) = report.add_header("table", names);
+    let (source, header_locations) = report.add_header("table", column_names);
     let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
-    for (k, (&value, location)) in names.iter().zip(&header_locations).enumerate() {
+    for (k, (&value, location)) in column_names.iter().zip(&header_locations).enumerate() {
         let name = Located { value, location: location.clone() };
         let axis_index = plan.axes.iter().position(|axis| axis.parameter.name == name.value);
         let Some(axis_index) = axis_index else {
             report.push_with(|_| column_without_axis(&name, plan));
             continue;
         };
-        if let Some(first) = axis_columns[axis_index] {
+        if let Some(first_column) = axis_columns[axis_index] {
             let title = format!("the column {} is given twice", quote(name.value));
             let diagnostic =
                 Diagnostic::new(title).at_location(&name.location, "expected each axis once");
-            report.push(diagnostic.at_location(&header_locations[first], "first given here"));
+            report
+                .push(diagnostic.at_location(&header_locations[first_column], "first given here"));
             continue;
         }
         axis_columns[axis_index] = Some(k);

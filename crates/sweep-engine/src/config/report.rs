@@ -111,10 +111,10 @@ impl Report {
     /// locations.
     pub fn add_header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
         let source = self.add(name, columns.join(","));
-        let mut next = 0;
+        let mut next_start = 0;
         let column_location = |column: &&str| {
-            let start = next;
-            next += column.len() + 1;
+            let start = next_start;
+            next_start += column.len() + 1;
             Location::new(source, start..start + column.len())
         };
         (source, columns.iter().map(column_location).collect())
@@ -301,7 +301,7 @@ impl Diagnostics {
 
     /// Returns the mistakes that are kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
-        let mistake = |Diagnostic { title, locations, help }: &Diagnostic| {
+        let to_mistake = |Diagnostic { title, locations, help }: &Diagnostic| {
             let main_location = locations.first();
             let line = main_location.map(|(location, _)| self.sources.line(location));
             Mistake {
@@ -314,7 +314,7 @@ impl Diagnostics {
                 hints: help.clone(),
             }
         };
-        self.shown.iter().map(mistake).collect()
+        self.shown.iter().map(to_mistake).collect()
     }
 }
 

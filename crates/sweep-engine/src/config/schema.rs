@@ -13,7 +13,7 @@ use crate::Model;
 use crate::plan::MAX_POINTS;
 
 /// The identifier of the draft.
-const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
+const SCHEMA_DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a model's grid files.
 pub fn grid_schema<M: Model>() -> Value {
@@ -24,26 +24,27 @@ pub fn grid_schema<M: Model>() -> Value {
     let names = json!({ "type": "object", "additionalProperties": { "type": "string" } });
     description.add(Key::new("columns", axis_description), names);
     let axes = json!({ "type": "array", "items": axis_schema() });
-    let axis_description = "swept parameters; the first varies slowest. With [design] each has \
-                 a range \
-                 without a count";
+    let axis_description = "swept parameters; the first varies slowest. With [design] each has a \
+                            range without a count";
     description.add(Key::new("axis", axis_description), axes);
     let mut schema = description.finish();
     // Only a design has distributions, and its ranges have no count.
     schema["if"] = json!({ "required": ["design"] });
     let range_with_count = json!({ "range": { "required": ["count"] } });
-    let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
+    let schema_of_every_axis =
+        |items: Value| json!({ "properties": { "axis": { "items": items } } });
     let without_count = json!({ "required": ["range"], "properties": range_with_count });
-    schema["then"] = every_axis(json!({ "not": without_count }));
+    schema["then"] = schema_of_every_axis(json!({ "not": without_count }));
     let without_distribution = json!({ "required": ["distribution"] });
-    schema["else"] =
-        every_axis(json!({ "properties": range_with_count, "not": without_distribution }));
+    schema["else"] = schema_of_every_axis(
+        json!({ "properties": range_with_count, "not": without_distribution }),
+    );
     document("Grid file of sweep", schema)
 }
 
 /// Returns a schema as a document.
 pub fn document(title: &str, mut schema: Value) -> Value {
-    schema["$schema"] = DRAFT.into();
+    schema["$schema"] = SCHEMA_DRAFT.into();
     schema["title"] = title.into();
     schema
 }
@@ -72,18 +73,20 @@ pub fn set_schema(parameters: &[Parameter<impl Sized>], patterns: Map<String, Va
 fn distribution_schema() -> Value {
     let distribution_schema = |&(kind, numbers): &(&'static str, &[(&'static str, Range)])| {
         let shape_numbers = numbers.iter().map(|(key, range)| (*key, number_schema(*range)));
-        let ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
+        let truncation_ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
         let mut required = vec!["kind"];
         match numbers {
             [] => required.extend(["from", "to"]),
             numbers => required.extend(numbers.iter().map(|(key, _)| *key)),
         }
         let kind = || ("kind", json!({ "const": kind }));
-        let with_numbers =
-            object_schema([kind()].into_iter().chain(shape_numbers).chain(ends), &required);
-        let with_tolerance =
+        let schema_with_numbers = object_schema(
+            [kind()].into_iter().chain(shape_numbers).chain(truncation_ends),
+            &required,
+        );
+        let schema_with_tolerance =
             object_schema([kind(), ("tolerance", tolerance_schema())], &["kind", "tolerance"]);
-        [with_numbers, with_tolerance]
+        [schema_with_numbers, schema_with_tolerance]
     };
     json!({
         "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
@@ -107,9 +110,9 @@ fn axis_schema() -> Value {
     let mut count = Form::Whole(1..=MAX_POINTS).schema();
     count["description"] = "the number of values, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
-    let ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
+    let range_ends = ["from", "to"].map(|key| (key, number_schema(Range::Any)));
     let count_and_spacing = [("count", count.clone()), ("spacing", spacing)];
-    let range = object_schema(ends.into_iter().chain(count_and_spacing), &["from", "to"]);
+    let range = object_schema(range_ends.into_iter().chain(count_and_spacing), &["from", "to"]);
     let tolerance_schema = json!({
         "type": "object",
         "properties": { "parameter": parameter, "tolerance": tolerance_schema(), "count": count },
@@ -119,12 +122,12 @@ fn axis_schema() -> Value {
     let values = json!({
         "type": "array", "items": number_schema(Range::Any), "minItems": 1, "uniqueItems": true,
     });
-    let with_parameter = |(key, value)| {
+    let schema_with_parameter = |(key, value)| {
         object_schema([("parameter", parameter.clone()), (key, value)], &["parameter", key])
     };
     let axis_forms =
         [("values", values), ("range", range), ("distribution", distribution_schema())];
     let axis_forms: Vec<Value> =
-        axis_forms.map(with_parameter).into_iter().chain([tolerance_schema]).collect();
+        axis_forms.map(schema_with_parameter).into_iter().chain([tolerance_schema]).collect();
     json!({ "oneOf": axis_forms })
 }

@@ -185,14 +185,14 @@ impl<'a> Section<'a> {
             DeValue::Array(_) => "an array",
             DeValue::Table(_) => "a table",
         };
-        let text = value.get_ref().as_str().filter(|_| expected.contains("number"));
-        let is_number = text.is_some_and(|text| text.parse::<f64>().is_ok());
-        let help = is_number.then_some("write the number without quotes");
+        let number_text = value.get_ref().as_str().filter(|_| expected.contains("number"));
+        let is_number = number_text.is_some_and(|number_text| number_text.parse::<f64>().is_ok());
+        let quotes_advice = is_number.then_some("write the number without quotes");
         let refusal = Diagnostic::new(format!("{description} has the wrong type")).at_location(
             &self.locate(value.span()),
             format!("expected {expected}, found {type_name}"),
         );
-        self.report.push(help.into_iter().fold(refusal, Diagnostic::with_help));
+        self.report.push(quotes_advice.into_iter().fold(refusal, Diagnostic::with_help));
         None
     }
 
@@ -210,9 +210,9 @@ impl<'a> Section<'a> {
             let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
             count.filter(|count| bounds.contains(count)).or_else(|| {
                 let title = format!("`{key}` = {integer} is out of range");
-                let least = bounds.start();
+                let min = bounds.start();
                 let max = bounds.end();
-                let expected = format!("expected a whole number from {least} to {max}");
+                let expected = format!("expected a whole number from {min} to {max}");
                 self.report.refuse(location, title, expected)
             })
         })
@@ -263,8 +263,8 @@ impl<'a> Section<'a> {
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
         self.items(key, "an array of numbers").map(|items| {
-            let number = |item| self.parse_number(&describe_array_entry(key), item, range);
-            let numbers: Vec<_> = items.value.iter().filter_map(number).collect();
+            let parse_item = |item| self.parse_number(&describe_array_entry(key), item, range);
+            let numbers: Vec<_> = items.value.iter().filter_map(parse_item).collect();
             let are_all_valid = numbers.len() == items.value.len();
             (numbers, are_all_valid)
         })
@@ -300,16 +300,17 @@ impl<'a> Section<'a> {
 
     /// Reads an array of tables, `[[key]]`; it is empty if the key is absent.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
-        let kind = format!("tables, each under [[{key}]]");
-        let items = self.items(key, &kind).into_located().map_or(&[][..], |items| items.value);
-        let section = |(k, item): (usize, &'a Value<'a>)| {
+        let expected_tables = format!("tables, each under [[{key}]]");
+        let items =
+            self.items(key, &expected_tables).into_located().map_or(&[][..], |items| items.value);
+        let section_of_item = |(k, item): (usize, &'a Value<'a>)| {
             let DeValue::Table(table) = item.get_ref() else {
-                return self.report_wrong_type(&describe_array_entry(key), item, &kind);
+                return self.report_wrong_type(&describe_array_entry(key), item, &expected_tables);
             };
             let title = format!("[[{key}]] number {}", k + 1);
             Some(Section::new(title, self.locate(item.span()), table, self.report))
         };
-        items.iter().enumerate().filter_map(section).collect()
+        items.iter().enumerate().filter_map(section_of_item).collect()
     }
 
     /// Returns every key as written, for tables whose keys are names of parameters.

@@ -92,13 +92,12 @@ pub(super) fn walk_sections<M: Model>(
 }
 
 /// The form of names, which become file names.
-const FILE_NAME_RULE: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning \
-                          with a \
-                          letter or digit, at most 100 characters";
+const FILE_NAME_RULE: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning with \
+                              a letter or digit, at most 100 characters";
 
 fn is_file_name(name: &str) -> bool {
-    let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
-    first
+    let begins_well = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
+    begins_well
         && name.len() <= 100
         && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
 }
@@ -141,16 +140,16 @@ pub fn read_name(
 
 /// Walks over the keys of `[time]`: the end and the window.
 fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
-    let description = Key::new("end_s", "end of the integration, s").settable();
-    let key = description.required("the end of the integration in s");
-    let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
-    let (kind, expected) = match &keys.walk {
+    let key_description = Key::new("end_s", "end of the integration, s").settable();
+    let key = key_description.required("the end of the integration in s");
+    let end_schema = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
+    let (form, expected) = match &keys.walk {
         KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
         KeyWalk::Set(_) => (Form::Number(Range::Positive), ""),
-        _ => (Form::Custom(&|_, _| Field::Absent, described), ""),
+        _ => (Form::Custom(&|_, _| Field::Absent, end_schema), ""),
     };
     let mut value = *end_s;
-    let end = keys.walk_key(key, &kind, &mut value).into_located().and_then(
+    let end = keys.walk_key(key, &form, &mut value).into_located().and_then(
         |Located { location, .. }| {
             if 0.0 < value && value <= MAX_END_S {
                 return Some(Located { value, location });
@@ -171,18 +170,19 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
             window_s[1] = end.value;
         }
     }
-    let description = "amplitudes are taken from the first to the second time, s; the whole run \
-                 if left \
-                 out";
+    let key_description = "amplitudes are taken from the first to the second time, s; the whole \
+                           run if left out";
     let expected = "expected two, [from, to], in s";
-    let kind = Form::Numbers(NumberArray {
+    let form = Form::Numbers(NumberArray {
         location_keys: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
         ..NumberArray::new(Range::NonNegative, 2..=2, expected)
     });
-    let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
-    let window_field = keys.walk_key(Key::new("window_s", description), &kind, &mut edges);
+    let mut window_edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
+    let window_field =
+        keys.walk_key(Key::new("window_s", key_description), &form, &mut window_edges);
     if let (Field::Present(window_field), Some(report)) = (window_field, keys.report())
-        && let Some(window) = check_window(&window_field.location, &edges, end.as_ref(), report)
+        && let Some(window) =
+            check_window(&window_field.location, &window_edges, end.as_ref(), report)
         && end.is_some()
     {
         *window_s = window;
@@ -220,37 +220,38 @@ fn check_window(
 
 /// Walks over the keys of `[integrator]`: the method and its settings.
 fn walk_method(
-    all: &'static [IntegrationMethod],
+    methods: &'static [IntegrationMethod],
     integrator: &mut Integrator,
     keys: &mut Keys<'_>,
 ) {
     let variants = Variants {
-        words: all.iter().map(|method| (method.name, method.description)).collect(),
-        default: Some(all.len() - 1),
-        settable_count: all.len(),
+        words: methods.iter().map(|method| (method.name, method.description)).collect(),
+        default: Some(methods.len() - 1),
+        settable_count: methods.len(),
     };
-    let current_method = all.iter().position(|method| method.name == integrator.name());
+    let current_method = methods.iter().position(|method| method.name == integrator.name());
     keys.walk_variants(
         Key::new("method", "").settable(),
         &variants,
         current_method,
         |keys, index| {
-            let method = &all[index];
+            let method = &methods[index];
             let name = method.name;
-            let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
-            for key in others.filter(|key| !method.has_setting(key)).collect::<BTreeSet<_>>() {
+            let other_keys =
+                methods.iter().flat_map(|other| other.settings).map(|setting| setting.key);
+            for key in other_keys.filter(|key| !method.has_setting(key)).collect::<BTreeSet<_>>() {
                 let methods_with_key =
-                    all.iter().filter(|other| other.has_setting(key)).map(|other| other.name);
+                    methods.iter().filter(|other| other.has_setting(key)).map(|other| other.name);
                 let methods_with_key: Vec<&str> = methods_with_key.collect();
                 let (noun, verb) = if methods_with_key.len() == 1 {
                     ("method", "has")
                 } else {
                     ("methods", "have")
                 };
-                let owners_list = methods_with_key.join("\" and \"");
+                let quoted_methods = methods_with_key.join("\" and \"");
                 keys.misplace(
                     &[key],
-                    &format!("only the {noun} \"{owners_list}\" {verb} it, not \"{name}\""),
+                    &format!("only the {noun} \"{quoted_methods}\" {verb} it, not \"{name}\""),
                 );
                 let title = format!("the method \"{name}\" has no `{key}`");
                 keys.refuse(

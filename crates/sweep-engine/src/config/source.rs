@@ -115,9 +115,9 @@ impl Sources {
         let end = (end.max(line_start) - line_start).max(start);
         // Newline bytes are counted instead of characters, because each mistake in a long list
         // counts the lines before it.
-        let number =
+        let line_number =
             text.as_bytes()[..line_start].iter().filter(|&&byte| byte == b'\n').count() + 1;
-        SourceLine { text: line, number, span: start..end }
+        SourceLine { text: line, number: line_number, span: start..end }
     }
 }
 
@@ -172,21 +172,22 @@ mod tests {
     #[test]
     fn files_that_are_no_text_are_named() {
         let folder = tempfile::tempdir().unwrap();
-        let file = |bytes: &[u8]| {
+        let read_bytes = |bytes: &[u8]| {
             let path = folder.path().join("file");
             std::fs::write(&path, bytes).unwrap();
             read(&path)
         };
-        assert_eq!(file(b"name = 1").unwrap(), "name = 1");
-        let refusal = |bytes: &[u8]| file(bytes).unwrap_err().to_string();
-        assert!(refusal(b"ab\xffc").ends_with("the first bad byte is number 3"));
-        assert!(refusal(b"\xff\xfen\0").starts_with("it is UTF-16"));
-        assert!(refusal(b"PAR1\xff").starts_with("it is a Parquet file"));
+        assert_eq!(read_bytes(b"name = 1").unwrap(), "name = 1");
+        let read_error = |bytes: &[u8]| read_bytes(bytes).unwrap_err().to_string();
+        assert!(read_error(b"ab\xffc").ends_with("the first bad byte is number 3"));
+        assert!(read_error(b"\xff\xfen\0").starts_with("it is UTF-16"));
+        assert!(read_error(b"PAR1\xff").starts_with("it is a Parquet file"));
         let largest_text = vec![b' '; MAX_TEXT_BYTES as usize];
         assert!(
-            refusal(&[&largest_text[..], b" "].concat()).starts_with("it is longer than 896 KiB")
+            read_error(&[&largest_text[..], b" "].concat())
+                .starts_with("it is longer than 896 KiB")
         );
-        assert!(file(&largest_text).is_ok());
+        assert!(read_bytes(&largest_text).is_ok());
         assert!(read(folder.path()).is_err());
     }
 }

@@ -38,9 +38,12 @@ pub fn parse_toml<'a>(text: &'a str, source: SourceId, report: &Report) -> Spann
     errors.sort_by_key(error_start);
     // The text after an array that is never closed gives many mistakes, of which only the first is
     // meaningful.
-    let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
-    let unclosed_index =
-        errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
+    let has_unclosed_array =
+        errors.iter().any(|error| error.message().starts_with("unclosed array"));
+    let unclosed_index = errors
+        .iter()
+        .position(|error| error.message().contains("array"))
+        .filter(|_| has_unclosed_array);
     if let Some(first) = unclosed_index {
         let location = Location::new(source, errors[first].span().unwrap_or(0..0));
         report.push_syntax(

@@ -66,15 +66,16 @@ mod tests {
 
     #[test]
     fn axes_and_seeds_are_uncorrelated() {
-        let column =
+        let positions_of_axis =
             |axis, seed| (0..1000).map(|i| position(i, 1000, axis, seed)).collect::<Vec<f64>>();
-        let correlation = |a: &[f64], b: &[f64]| {
+        let correlation_of = |a: &[f64], b: &[f64]| {
             let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - 0.5) * (b - 0.5)).sum();
             sum / 1000.0 * 12.0
         };
         // The bound for independent columns is four standard deviations, 4 / sqrt(1000).
         for (a, b) in [((0, 1), (1, 1)), ((0, 1), (0, 2)), ((2, 5), (3, 5))] {
-            let coefficient = correlation(&column(a.0, a.1), &column(b.0, b.1));
+            let coefficient =
+                correlation_of(&positions_of_axis(a.0, a.1), &positions_of_axis(b.0, b.1));
             assert!(coefficient.abs() < 0.13, "{a:?} {b:?}: {coefficient}");
         }
     }

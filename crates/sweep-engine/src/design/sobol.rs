@@ -111,7 +111,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..8)
             .map(|i| [0, 1, 2].map(|axis| f64::from(coordinate(i, axis)) * 2.0_f64.powi(-32)))
             .collect();
-        let published = [
+        let published_points = [
             [0.0, 0.0, 0.0],
             [0.5, 0.5, 0.5],
             [0.75, 0.25, 0.25],
@@ -121,7 +121,7 @@ mod tests {
             [0.625, 0.125, 0.875],
             [0.125, 0.625, 0.375],
         ];
-        for point in published {
+        for point in published_points {
             assert!(points.contains(&point), "{point:?} is not among {points:?}");
         }
     }
@@ -142,17 +142,17 @@ mod tests {
     #[test]
     fn the_first_two_axes_fill_every_elementary_rectangle() {
         // A (0, m, 2)-net in base 2 remains one under nested scrambling.
-        for columns in 0..=8_u32 {
-            let column_count = f64::from(1_u32 << columns);
-            let row_count = f64::from(1_u32 << (8 - columns));
+        for column_bits in 0..=8_u32 {
+            let column_count = f64::from(1_u32 << column_bits);
+            let row_count = f64::from(1_u32 << (8 - column_bits));
             let mut cells: Vec<u32> = (0..256)
                 .map(|i| {
-                    ((position(i, 0, 9) * column_count) as u32) << (8 - columns)
+                    ((position(i, 0, 9) * column_count) as u32) << (8 - column_bits)
                         | (position(i, 1, 9) * row_count) as u32
                 })
                 .collect();
             cells.sort_unstable();
-            assert_eq!(cells, (0..256).collect::<Vec<_>>(), "{columns}");
+            assert_eq!(cells, (0..256).collect::<Vec<_>>(), "{column_bits}");
         }
     }
 
@@ -168,20 +168,21 @@ mod tests {
 
     #[test]
     fn the_mean_of_a_smooth_function_converges_faster_than_random() {
-        let error = |points: u64| {
+        let mean_error = |points: u64| {
             let sum: f64 = (0..points)
                 .map(|i| (0..4).map(|axis| 1.0 + (position(i, axis, 1) - 0.5)).product::<f64>())
                 .sum();
             (sum / points as f64 - 1.0).abs()
         };
         // The error of independent random points would be about 0.009.
-        assert!(error(4096) < 3e-4, "{}", error(4096));
+        assert!(mean_error(4096) < 3e-4, "{}", mean_error(4096));
     }
 
     #[test]
     fn seeds_scramble_differently() {
-        let column = |seed| (0..64).map(|i| position(i, 0, seed).to_bits()).collect::<Vec<_>>();
-        assert_ne!(column(1), column(2));
-        assert_eq!(column(1), column(1));
+        let scrambled_positions =
+            |seed| (0..64).map(|i| position(i, 0, seed).to_bits()).collect::<Vec<_>>();
+        assert_ne!(scrambled_positions(1), scrambled_positions(2));
+        assert_eq!(scrambled_positions(1), scrambled_positions(1));
     }
 }

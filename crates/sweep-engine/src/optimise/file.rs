@@ -78,7 +78,7 @@ pub fn trial_columns<M: Model>(study: &Study<M>) -> TrialColumns {
     for (k, goal) in study.conditions.iter().enumerate() {
         responses.push(DeclaredColumn::new(excess_name(k), "1", goal.text(), CellType::Measured));
     }
-    TrialColumns { keys, responses }
+    TrialColumns { key_columns: keys, value_columns: responses }
 }
 
 /// Returns the unit of an objective.

@@ -7,7 +7,7 @@ use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
 use crate::evaluator::{CachedEvaluator, RequestValues, SearchStop};
-use crate::store::{Layout, PointRows, ResultRows, RowCells, TrialKey, Trials};
+use crate::store::{BatchBuilder, Layout, PointRows, RowCells, TrialKey, Trials};
 use crate::{Error, Execution, Model, Progress, StoreError};
 use sweep_files::panics::{into_content, lock};
 use sweep_results::{Goal, Slack};
@@ -22,7 +22,7 @@ pub fn search<M: Model>(
     trials: Option<Trials>,
     execution: Execution<'_>,
 ) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
-    let stored_candidates = trials.as_ref().map_or(0, Trials::count) as u64;
+    let stored_candidates = trials.as_ref().map_or(0, Trials::trial_count) as u64;
     let progress = Progress::new(execution.progress, study.evolution.candidates, stored_candidates);
     let show_candidates = |candidates| progress.show(candidates);
     let threads = execution.threads()?;
@@ -110,15 +110,15 @@ fn collect_batch<M: Model>(
     values: &[f64],
     points: Vec<PointRows>,
 ) -> Result<RecordBatch, StoreError> {
-    let mut rows = ResultRows::new(layout);
+    let mut rows = BatchBuilder::new(layout);
     let keyed_rows = |point_rows: PointRows| {
         let row = point_rows.point % study.rows();
         point_rows.rows.into_iter().map(move |cells: RowCells| (row, cells))
     };
     for (row, cells) in points.into_iter().flat_map(keyed_rows) {
-        rows.push(row, study.axis_values(values, row), cells);
+        rows.push_row(row, study.axis_values(values, row), cells);
     }
-    rows.take().map_err(row_defect)
+    rows.take_batch().map_err(row_defect)
 }
 
 /// Returns the key of a candidate: its number, and its parameters.

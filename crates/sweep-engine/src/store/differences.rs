@@ -34,26 +34,26 @@ impl fmt::Display for PlanDifference {
 
 /// Returns every leaf at which two JSON values differ.
 pub(super) fn find_differences(older: &Value, present: &Value) -> Vec<PlanDifference> {
-    let mut found_differences = Vec::new();
+    let mut differences = Vec::new();
     visit_leaves([Some(older), Some(present)], |_, _| true, &mut Vec::new(), &mut |path,
                                                                                    [
         older,
         present,
     ]| {
         if older != present {
-            let pointer_step = |step: &Step<'_>| match step {
+            let format_pointer_step = |step: &Step<'_>| match step {
                 Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
                 Step::Index(index) => format!("/{index}"),
             };
-            let pointer = path.iter().map(pointer_step).collect();
-            found_differences.push(PlanDifference {
+            let pointer = path.iter().map(format_pointer_step).collect();
+            differences.push(PlanDifference {
                 pointer,
                 older: older.map(format_value),
                 present: present.map(format_value),
             });
         }
     });
-    found_differences
+    differences
 }
 
 /// Formats a value on one line, and shortens it if it is long.

@@ -20,7 +20,7 @@ pub enum StoreError {
         /// The path of the result that was asked for.
         output: PathBuf,
         /// The processes that work on it, as far as their names could be read.
-        holders: Vec<Holder>,
+        holders: Vec<LockHolder>,
     },
     /// The run folder belongs to another plan, or to a build whose numbers may differ.
     #[error(
@@ -119,7 +119,7 @@ pub enum StoreError {
 
 /// A process that works on an output.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Holder {
+pub struct LockHolder {
     /// The process id.
     pub pid: u32,
     /// The name of the host on which the process runs.
@@ -178,23 +178,28 @@ fn completion_advice(missing_shards: &Option<String>) -> &'static str {
     }
 }
 
-fn describe_shards(missing: &Option<String>) -> String {
-    missing.as_ref().map_or(String::new(), |list| format!(", of shards {list}"))
+fn describe_shards(missing_shards: &Option<String>) -> String {
+    missing_shards
+        .as_ref()
+        .map_or(String::new(), |shard_numbers| format!(", of shards {shard_numbers}"))
 }
 
-fn describe_holders(holders: &[Holder]) -> String {
+fn describe_holders(holders: &[LockHolder]) -> String {
     /// The number of processes that are named. Basis: a message of one line. Doubling it names
     /// twice as many.
-    const MAX_NAMED: usize = 4;
-    let name = |Holder { pid, host, shard }: &Holder| {
+    const MAX_NAMED_HOLDERS: usize = 4;
+    let describe_holder = |LockHolder { pid, host, shard }: &LockHolder| {
         let shard = shard.map_or(String::new(), |shard| format!(" (shard {shard})"));
         format!("process {pid} on {host}{shard}")
     };
-    let names: Vec<String> = holders.iter().take(MAX_NAMED).map(name).collect();
+    let holder_texts: Vec<String> =
+        holders.iter().take(MAX_NAMED_HOLDERS).map(describe_holder).collect();
     match holders.len() {
         0 => "another run".to_owned(),
-        1..=MAX_NAMED => names.join(", "),
-        all => format!("{} and {} more", names.join(", "), all - MAX_NAMED),
+        1..=MAX_NAMED_HOLDERS => holder_texts.join(", "),
+        holder_count => {
+            format!("{} and {} more", holder_texts.join(", "), holder_count - MAX_NAMED_HOLDERS)
+        }
     }
 }
 
@@ -202,12 +207,12 @@ fn describe_holders(holders: &[Holder]) -> String {
 fn list_differences(differences: &[PlanDifference]) -> String {
     /// The number of differences that are shown. Basis: half of the lines of a terminal. Doubling
     /// it shows twice as many.
-    const MAX_LISTED: usize = 12;
-    let first_differences = differences.iter().take(MAX_LISTED);
+    const MAX_LISTED_DIFFERENCES: usize = 12;
+    let listed_differences = differences.iter().take(MAX_LISTED_DIFFERENCES);
     let mut text: String =
-        first_differences.map(|difference| format!("  {difference}\n")).collect();
-    if differences.len() > MAX_LISTED {
-        let hidden_count = differences.len() - MAX_LISTED;
+        listed_differences.map(|difference| format!("  {difference}\n")).collect();
+    if differences.len() > MAX_LISTED_DIFFERENCES {
+        let hidden_count = differences.len() - MAX_LISTED_DIFFERENCES;
         let plural = if hidden_count == 1 { "" } else { "s" };
         text += &format!("  and {hidden_count} more difference{plural}\n");
     }

@@ -13,7 +13,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Folder, Holder, LOCK_FILE, StoreError};
+use super::{Folder, LOCK_FILE, LockHolder, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
 /// The maximum length of a lock file, bytes. Basis: a process id and the longest name of a host.
@@ -42,7 +42,7 @@ pub struct Lock {
 
 impl Lock {
     /// Creates the folder if it does not exist, and locks it: for the whole run, or for one shard.
-    pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
+    pub fn acquire(folder: &Folder, shard_index: Option<u64>) -> Result<Self, StoreError> {
         let path = folder.file(LOCK_FILE);
         for attempt in 0..MAX_ATTEMPTS {
             if attempt > 0 {
@@ -61,19 +61,19 @@ impl Lock {
                 }
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
-            refuse_other_file(&mut file, &path)?;
+            refuse_foreign_file(&mut file, &path)?;
             let lock_result =
-                if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
+                if shard_index.is_some() { file.try_lock_shared() } else { file.try_lock() };
             match lock_result {
                 Ok(()) if !atomic::is_at_path(&file, &path) => continue,
                 Ok(()) => {
-                    let shard = match shard {
-                        Some(shard) => lock_shard(folder, shard)?,
+                    let shard_file = match shard_index {
+                        Some(shard_index) => lock_shard(folder, shard_index)?,
                         None => write_holder(&mut file, &path).map(|()| None)?,
                     };
                     return Ok(Self {
                         _run_file: Some(file),
-                        _shard_file: shard,
+                        _shard_file: shard_file,
                         path,
                         is_unsupported: false,
                     });
@@ -96,7 +96,7 @@ impl Lock {
     }
 
     /// Returns a note for the user if the file system has no locks.
-    pub fn note(&self, folder: &Folder) -> Option<String> {
+    pub fn note_missing_locks(&self, folder: &Folder) -> Option<String> {
         let warning =
             "is on a file system without locks: make sure that nothing else runs on this output";
         self.is_unsupported.then(|| format!("{} {warning}", folder.path.display()))
@@ -110,13 +110,14 @@ impl Lock {
 }
 
 /// Returns the processes that work in the folder now, as far as their names can be read.
-pub(super) fn find_holders(folder: &Folder) -> Vec<Holder> {
+pub(super) fn find_holders(folder: &Folder) -> Vec<LockHolder> {
     let names = regular::file_names(&folder.path).unwrap_or_default().into_iter();
-    let lock = |name: OsString| Some((shard_from_name(name.to_str()?)?, folder.file(name)));
-    let mut locks: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
-    locks.sort_unstable();
-    let mut holders: Vec<Holder> =
-        locks.iter().filter_map(|(shard, path)| read_holder(path, Some(*shard))).collect();
+    let shard_and_path =
+        |name: OsString| Some((shard_of_lock_name(name.to_str()?)?, folder.file(name)));
+    let mut shard_locks: Vec<(u64, PathBuf)> = names.filter_map(shard_and_path).collect();
+    shard_locks.sort_unstable();
+    let mut holders: Vec<LockHolder> =
+        shard_locks.iter().filter_map(|(shard, path)| read_holder(path, Some(*shard))).collect();
     // While shards share the folder's lock, the lock's file names the last process that held the
     // lock alone.
     if holders.is_empty() {
@@ -126,7 +127,7 @@ pub(super) fn find_holders(folder: &Folder) -> Vec<Holder> {
 }
 
 /// Refuses a file that is not a lock: one that is not empty and has no name by [`write_holder`].
-fn refuse_other_file(file: &mut File, path: &Path) -> Result<(), StoreError> {
+fn refuse_foreign_file(file: &mut File, path: &Path) -> Result<(), StoreError> {
     if is_lock(file).map_err(StoreError::io("read", path))? {
         return Ok(());
     }
@@ -142,11 +143,12 @@ fn refuse_other_file(file: &mut File, path: &Path) -> Result<(), StoreError> {
 fn is_lock(file: &mut File) -> io::Result<bool> {
     let mut text = Vec::new();
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text)?;
-    let name = std::str::from_utf8(&text).ok().and_then(|text| text.strip_suffix('\n'));
-    let is_name = name.and_then(|name| name.split_once(' ')).is_some_and(|(process, host)| {
-        process.parse::<u32>().is_ok() && !host.contains(char::is_control)
-    });
-    Ok(text.is_empty() || is_name)
+    let holder_line = std::str::from_utf8(&text).ok().and_then(|text| text.strip_suffix('\n'));
+    let is_holder_line =
+        holder_line.and_then(|holder_line| holder_line.split_once(' ')).is_some_and(
+            |(process, host)| process.parse::<u32>().is_ok() && !host.contains(char::is_control),
+        );
+    Ok(text.is_empty() || is_holder_line)
 }
 
 /// Returns whether the file at a path is a lock.
@@ -156,10 +158,10 @@ pub(super) fn is_lock_file(path: &Path) -> bool {
 
 /// Locks the file of a shard; `None` if another process has locked it.
 fn lock_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
-    let path = folder.file(shard_name(shard));
+    let path = folder.file(shard_lock_name(shard));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
-    refuse_other_file(&mut file, &path)?;
+    refuse_foreign_file(&mut file, &path)?;
     if file.try_lock().is_err() {
         return Ok(None);
     }
@@ -169,10 +171,10 @@ fn lock_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
 
 /// Writes the id and the host of this process into a locked file.
 fn write_holder(file: &mut File, path: &Path) -> Result<(), StoreError> {
-    let name = format!("{} {}\n", std::process::id(), super::provenance::host_name());
+    let holder_line = format!("{} {}\n", std::process::id(), super::provenance::host_name());
     file.set_len(0)
         .and_then(|()| file.rewind())
-        .and_then(|()| file.write_all(name.as_bytes()))
+        .and_then(|()| file.write_all(holder_line.as_bytes()))
         .map_err(StoreError::io("write the process id to", path))
 }
 
@@ -185,18 +187,18 @@ fn is_unsupported(error: &io::Error) -> bool {
 }
 
 /// Returns the shard that the name of its lock file gives, if the name is one.
-pub(super) fn shard_from_name(name: &str) -> Option<u64> {
+pub(super) fn shard_of_lock_name(name: &str) -> Option<u64> {
     let shard = name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()?;
-    (shard_name(shard) == name).then_some(shard)
+    (shard_lock_name(shard) == name).then_some(shard)
 }
 
 /// Returns the name of a shard's lock file.
-fn shard_name(shard: u64) -> String {
+fn shard_lock_name(shard: u64) -> String {
     format!("shard-{shard}.lock")
 }
 
 /// Returns the process that is named in a lock file, if the file is locked.
-fn read_holder(path: &Path, shard: Option<u64>) -> Option<Holder> {
+fn read_holder(path: &Path, shard: Option<u64>) -> Option<LockHolder> {
     let file = regular::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
         return None;
@@ -204,7 +206,7 @@ fn read_holder(path: &Path, shard: Option<u64>) -> Option<Holder> {
     let mut text = String::new();
     file.take(MAX_LOCK_BYTES).read_to_string(&mut text).ok()?;
     let (pid, host) = text.trim_end().split_once(' ')?;
-    Some(Holder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
+    Some(LockHolder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
 }
 
 #[cfg(test)]
@@ -212,11 +214,11 @@ mod tests {
     use super::*;
     use crate::store::synthetic;
 
-    fn folder(home: &tempfile::TempDir) -> Folder {
-        Folder::new(&home.path().join("x.parquet"), &synthetic::layout()).unwrap()
+    fn test_run_folder(test_folder: &tempfile::TempDir) -> Folder {
+        Folder::new(&test_folder.path().join("x.parquet"), &synthetic::layout()).unwrap()
     }
 
-    fn busy_holders(result: Result<Lock, StoreError>) -> Vec<Holder> {
+    fn busy_holders(result: Result<Lock, StoreError>) -> Vec<LockHolder> {
         match result {
             Err(StoreError::Busy { holders, .. }) => holders,
             other => panic!("expected a busy output, got {other:?}"),
@@ -225,8 +227,8 @@ mod tests {
 
     #[test]
     fn a_file_in_the_place_of_the_folder_is_kept_and_said_to_be_in_the_way() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = folder(&home);
+        let test_folder = tempfile::tempdir().unwrap();
+        let folder = test_run_folder(&test_folder);
         fs::write(&folder.path, "my thesis").unwrap();
         let message = Lock::acquire(&folder, None).unwrap_err().to_string();
         assert!(message.contains("a file of that name is in the way"), "{message}");
@@ -235,28 +237,28 @@ mod tests {
 
     #[test]
     fn a_second_run_is_refused_with_the_process_of_the_first() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = folder(&home);
-        let first = Lock::acquire(&folder, None).unwrap();
+        let test_folder = tempfile::tempdir().unwrap();
+        let folder = test_run_folder(&test_folder);
+        let first_lock = Lock::acquire(&folder, None).unwrap();
         let holders = busy_holders(Lock::acquire(&folder, None));
         assert_eq!(holders[0].pid, std::process::id());
         assert_eq!(holders[0].shard, None);
-        drop(first);
+        drop(first_lock);
         Lock::acquire(&folder, None).unwrap();
     }
 
     #[test]
     fn shards_run_side_by_side_but_not_beside_a_whole_run() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = folder(&home);
-        let shards: Vec<Lock> =
+        let test_folder = tempfile::tempdir().unwrap();
+        let folder = test_run_folder(&test_folder);
+        let shard_locks: Vec<Lock> =
             [1, 2, 2].iter().map(|&shard| Lock::acquire(&folder, Some(shard)).unwrap()).collect();
         let holders = busy_holders(Lock::acquire(&folder, None));
         assert_eq!(
             holders.iter().map(|holder| holder.shard).collect::<Vec<_>>(),
             [Some(1), Some(2)]
         );
-        drop(shards);
+        drop(shard_locks);
         let run_lock = Lock::acquire(&folder, None).unwrap();
         busy_holders(Lock::acquire(&folder, Some(1)));
         drop(run_lock);
@@ -266,10 +268,10 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_lock_overwrites_neither_the_target_of_a_link_nor_a_foreign_file() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = folder(&home);
+        let test_folder = tempfile::tempdir().unwrap();
+        let folder = test_run_folder(&test_folder);
         fs::create_dir_all(&folder.path).unwrap();
-        let foreign_file = home.path().join("thesis.tex");
+        let foreign_file = test_folder.path().join("thesis.tex");
         fs::write(&foreign_file, "my thesis").unwrap();
         for (name, shard) in
             [(folder.file(LOCK_FILE), None), (folder.file("shard-3.lock"), Some(3))]
@@ -297,11 +299,11 @@ mod tests {
 
     #[test]
     fn a_deleted_lock_file_does_not_block_a_new_lock() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = folder(&home);
-        let first = Lock::acquire(&folder, None).unwrap();
+        let test_folder = tempfile::tempdir().unwrap();
+        let folder = test_run_folder(&test_folder);
+        let first_lock = Lock::acquire(&folder, None).unwrap();
         let deleted_file = regular::open_or_create(&folder.file(LOCK_FILE)).unwrap();
-        first.delete().unwrap();
+        first_lock.delete().unwrap();
         deleted_file.try_lock().unwrap();
         assert!(!atomic::is_at_path(&deleted_file, &folder.file(LOCK_FILE)));
         Lock::acquire(&folder, None).unwrap();

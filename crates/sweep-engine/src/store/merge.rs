@@ -17,28 +17,33 @@ use sweep_files::batches::from_arrow;
 use sweep_files::{self as files, ParquetFile, Writer, atomic, panics, seal};
 
 /// An unfinished result file.
-struct MapWriter<'a> {
+struct ResultWriter<'a> {
     output: &'a Path,
     schema: SchemaRef,
     file: NamedTempFile,
     writer: Writer<BufWriter<File>>,
 }
 
-impl<'a> MapWriter<'a> {
+impl<'a> ResultWriter<'a> {
     /// Begins the result file of a job in a temporary file; `output` is its later path, for
     /// messages.
-    fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
+    fn begin(
+        job: &Job<'_>,
+        temporary_file: NamedTempFile,
+        output: &'a Path,
+    ) -> Result<Self, StoreError> {
         let schema = job.layout.schema();
-        let properties = schema::properties(job);
-        let file_handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
+        let properties = schema::result_writer_properties(job);
+        let file_handle =
+            temporary_file.as_file().try_clone().map_err(StoreError::io("write", output))?;
         let create_writer = || Writer::new(BufWriter::new(file_handle), &schema, properties);
-        let writer = write_to(output, create_writer)?;
-        Ok(Self { output, schema, file, writer })
+        let writer = catch_write_errors(output, create_writer)?;
+        Ok(Self { output, schema, file: temporary_file, writer })
     }
 
     /// Writes a batch of a part. The batch gets the schema of the result, because batches stay in
     /// memory until their row group is complete, and a schema for each of them would take memory.
-    fn write_part(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
+    fn write_part_batch(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
         let batch = RecordBatch::try_new(Arc::clone(&self.schema), batch.columns().to_vec());
         let batch =
             batch.map_err(|error| StoreError::parquet("write", self.output)(from_arrow(error)))?;
@@ -46,7 +51,7 @@ impl<'a> MapWriter<'a> {
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
-        write_to(self.output, || self.writer.write(batch))
+        catch_write_errors(self.output, || self.writer.write(batch))
     }
 
     /// Writes the end of the file and its digest, and returns the temporary file.
@@ -54,7 +59,7 @@ impl<'a> MapWriter<'a> {
         let Self { output, mut file, writer, .. } = self;
         // Closing flushes to the file and returns the error of a full disk as such; `into_inner`
         // would return only its text.
-        write_to(output, || {
+        catch_write_errors(output, || {
             let mut file = writer.end()?;
             file.append_key_value_metadata(seal::blank_digest());
             file.close()
@@ -66,7 +71,7 @@ impl<'a> MapWriter<'a> {
 
 /// Runs a function that writes by the Parquet library, and turns its errors and panics into errors
 /// about the output.
-fn write_to<T>(
+fn catch_write_errors<T>(
     output: &Path,
     write: impl FnOnce() -> Result<T, ParquetError>,
 ) -> Result<T, StoreError> {
@@ -83,7 +88,7 @@ pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Resul
     files::check_replaceable(output, job.layout.kind)?;
     let folder = atomic::parent(output);
     files::create_folder_without_leftovers(folder)?;
-    let mut writer = MapWriter::begin(job, atomic::create_temporary(folder)?, output)?;
+    let mut writer = ResultWriter::begin(job, atomic::create_temporary(folder)?, output)?;
     batches.iter().try_for_each(|batch| writer.write(batch))?;
     let file = writer.finish()?;
     files::check_replaceable(output, job.layout.kind)?;
@@ -108,21 +113,23 @@ impl OpenRun {
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.folder.output.clone();
         let file = atomic::create_temporary(&self.folder.path)?;
-        let mut writer = MapWriter::begin(job, file, &output)?;
-        for chunk in 0..self.chunks() {
+        let mut writer = ResultWriter::begin(job, file, &output)?;
+        for chunk in 0..self.chunk_count() {
             if stop() {
                 return Ok(None);
             }
-            let Some(batches) = self.read_complete(chunk, |part| part.result_batches())? else {
-                self.rescan()?;
+            let Some(batches) =
+                self.read_complete_chunk(chunk, |part| part.read_result_batches())?
+            else {
+                self.rescan_parts()?;
                 return Err(self.incomplete_error()?);
             };
-            batches.iter().try_for_each(|batch| writer.write_part(batch))?;
+            batches.iter().try_for_each(|batch| writer.write_part_batch(batch))?;
         }
         let file = writer.finish()?;
         // The file is read before it is moved to the output, because an unreadable file must not
         // replace another one.
-        let tally = read::tally(&ParquetFile::open(file.path())?)?;
+        let tally = read::tally_rows(&ParquetFile::open(file.path())?)?;
         files::check_replaceable(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
@@ -139,7 +146,7 @@ impl OpenRun {
         tally: &Tally,
         session: Option<Session>,
     ) -> Result<Vec<String>, StoreError> {
-        let sidecar = provenance::sidecar(&self.folder, job, tally, session)?;
+        let sidecar = provenance::sidecar_content(&self.folder, job, tally, session)?;
         let path = self.folder.sidecar();
         files::check_replaceable(&path, self.folder.sidecar_kind())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;

@@ -15,7 +15,7 @@ use serde_json::json;
 use super::differences::PlanDifference;
 use super::lock::Lock;
 use super::own_files;
-use super::part::{Damage, PartError};
+use super::part::{PartDamage, PartError};
 use super::plan_file::{PlanFile, StoredPlan, format_json, rename_damaged};
 use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
@@ -32,7 +32,7 @@ use sweep_files::{FileError, ParquetFile, atomic, regular};
 pub struct OpenOptions<'a> {
     /// Whether to start over: finished chunks are deleted at once; a finished result stays until
     /// the new one replaces it.
-    pub fresh: bool,
+    pub starts_over: bool,
     /// The shard to compute; if `None`, the scheduler's environment variables give it.
     pub shard: Option<ShardRequest>,
     /// The function that looks up the scheduler's environment variables.
@@ -55,13 +55,13 @@ pub struct OpenRun {
     pub folder: Folder,
     /// The lock of the folder.
     pub lock: Lock,
-    parts: PointParts,
+    point_parts: PointParts,
     /// The shard of this process and the division into shards, if the run is divided.
     shard: Option<(Shard, ShardLayout)>,
     /// The chunks of this process that are complete; behind a mutex because workers read the set
     /// while the writer adds to it.
     complete_chunks: Mutex<BTreeSet<u64>>,
-    /// The rows of this process's incomplete chunks, until [`OpenRun::take_incomplete`].
+    /// The rows of this process's incomplete chunks, until [`OpenRun::take_incomplete_chunks`].
     incomplete_chunks: Mutex<BTreeMap<u64, Vec<PointRows>>>,
     notes: Vec<String>,
 }
@@ -81,12 +81,12 @@ impl OpenRun {
         options: OpenOptions<'_>,
     ) -> Result<OpenOutcome<(ResultFile, Tally), Self>, StoreError> {
         let folder = Folder::new(output, &job.layout)?;
-        let resolve =
+        let resolve_with =
             |stored_layout| shard::resolve_shard(options.shard, options.environment, stored_layout);
         let mut shard = None;
-        let shard_index = || {
-            shard = resolve(ShardLayout::read(&folder)?)?;
-            if options.fresh && shard.is_some() {
+        let find_shard_index = || {
+            shard = resolve_with(ShardLayout::read(&folder)?)?;
+            if options.starts_over && shard.is_some() {
                 return Err(StoreError::Refused(format!(
                     "--fresh would delete what the other shards have done\n  = help: delete {} \
                      first, then start the shards",
@@ -95,26 +95,27 @@ impl OpenRun {
             }
             Ok(shard.map(|(shard, _)| shard.index))
         };
-        let find_finished = || finished_result(&folder, job);
+        let find_finished = || find_finished_result(&folder, job);
         let (lock, notes) =
-            match claim_folder(&folder, job, options.fresh, shard_index, find_finished)? {
+            match claim_folder(&folder, job, options.starts_over, find_shard_index, find_finished)?
+            {
                 OpenOutcome::Finished(found) => return Ok(OpenOutcome::Finished(found)),
                 OpenOutcome::Open(lock_and_notes) => lock_and_notes,
             };
         if let Some((_, layout)) = shard {
             let stored_layout = layout.write_if_absent(&folder)?;
-            shard = resolve(Some(stored_layout))?;
+            shard = resolve_with(Some(stored_layout))?;
         }
         let mut run = Self {
             folder,
             lock,
-            parts: PointParts::new(job),
+            point_parts: PointParts::new(job),
             shard,
             complete_chunks: Mutex::default(),
             incomplete_chunks: Mutex::default(),
             notes,
         };
-        run.rescan()?;
+        run.rescan_parts()?;
         Ok(OpenOutcome::Open(run))
     }
 
@@ -131,30 +132,38 @@ impl OpenRun {
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
         }
-        Self::open(output, job, OpenOptions { fresh: false, shard: None, environment: &|_| None })
+        Self::open(
+            output,
+            job,
+            OpenOptions { starts_over: false, shard: None, environment: &|_| None },
+        )
     }
 
     /// Reads the chunks again, and renames parts that are damaged.
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn rescan(&mut self) -> Result<(), StoreError> {
+    pub fn rescan_parts(&mut self) -> Result<(), StoreError> {
         let mut complete_chunks = BTreeSet::new();
         let mut incomplete_chunks = BTreeMap::new();
-        for chunk in part_indices(&self.folder)? {
-            if chunk >= self.chunks() || !self.owns(chunk) {
+        for chunk in list_part_indices(&self.folder)? {
+            if chunk >= self.chunk_count() || !self.owns_chunk(chunk) {
                 continue;
             }
-            let length = self.chunk_length(chunk);
-            let outcomes = self.read(chunk, |part| {
-                if part.points() == length { Ok(None) } else { part.outcomes().map(Some) }
+            let chunk_points = self.chunk_length(chunk);
+            let rows_if_incomplete = self.read(chunk, |part| {
+                if part.point_count() == chunk_points {
+                    Ok(None)
+                } else {
+                    part.read_point_rows().map(Some)
+                }
             })?;
-            match outcomes {
+            match rows_if_incomplete {
                 Some(None) => {
                     complete_chunks.insert(chunk);
                 }
-                Some(Some(outcomes)) => {
-                    incomplete_chunks.insert(chunk, outcomes);
+                Some(Some(rows_if_incomplete)) => {
+                    incomplete_chunks.insert(chunk, rows_if_incomplete);
                 }
                 None => {}
             }
@@ -166,14 +175,14 @@ impl OpenRun {
 
     /// Reads the part of a complete chunk. Returns `None` if there is none, or if it is damaged; a
     /// damaged part is renamed and noted.
-    pub(super) fn read_complete<T>(
+    pub(super) fn read_complete_chunk<T>(
         &mut self,
         chunk: u64,
         read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
     ) -> Result<Option<T>, StoreError> {
-        let length = self.chunk_length(chunk);
+        let chunk_points = self.chunk_length(chunk);
         let value = self.read(chunk, |part| {
-            if part.points() == length { read(part).map(Some) } else { Ok(None) }
+            if part.point_count() == chunk_points { read(part).map(Some) } else { Ok(None) }
         })?;
         let value = value.flatten();
         if value.is_none() {
@@ -183,9 +192,9 @@ impl OpenRun {
     }
 
     /// Returns the stored rows of a point, whichever process has computed them.
-    pub fn stored_rows(&self, point: u64) -> Option<PointRows> {
-        let part = self.parts.open(&self.folder, self.chunk_of(point)).ok()??;
-        part.outcomes().ok()?.into_iter().find(|rows| rows.point == point)
+    pub fn find_stored_rows(&self, point: u64) -> Option<PointRows> {
+        let part = self.point_parts.open(&self.folder, self.chunk_of(point)).ok()??;
+        part.read_point_rows().ok()?.into_iter().find(|rows| rows.point == point)
     }
 
     /// Reads the part of a chunk, if there is one. A damaged part is renamed and noted.
@@ -194,7 +203,7 @@ impl OpenRun {
         chunk: u64,
         read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
     ) -> Result<Option<T>, StoreError> {
-        match read_part(&self.parts, &self.folder, chunk, read)? {
+        match read_part(&self.point_parts, &self.folder, chunk, read)? {
             Ok(found) => Ok(found),
             Err(damage) => {
                 let note = rename_damaged_part(&self.folder, chunk, damage)?;
@@ -213,17 +222,17 @@ impl OpenRun {
         &self,
         job: &Job<'_>,
         chunk: u64,
-        mut outcomes: Vec<PointRows>,
+        mut chunk_rows: Vec<PointRows>,
     ) -> Result<(), StoreError> {
-        outcomes.sort_by_key(|outcome| outcome.point);
-        let bytes = self.parts.encode(job, chunk, &outcomes)?;
-        let count = outcomes.len() as u64;
-        let is_complete = count == self.chunk_length(chunk);
+        chunk_rows.sort_by_key(|point_rows| point_rows.point);
+        let bytes = self.point_parts.encode(job, chunk, &chunk_rows)?;
+        let point_count = chunk_rows.len() as u64;
+        let is_complete = point_count == self.chunk_length(chunk);
         // Another process with the same shard may have written more rows of this chunk.
         if !is_complete
             && let Ok(Some(stored_points)) =
-                read_part(&self.parts, &self.folder, chunk, |part| Ok(part.points()))?
-            && stored_points > count
+                read_part(&self.point_parts, &self.folder, chunk, |part| Ok(part.point_count()))?
+            && stored_points > point_count
         {
             return Ok(());
         }
@@ -231,7 +240,7 @@ impl OpenRun {
         if is_complete {
             self.complete_chunks().insert(chunk);
         } else {
-            lock(&self.incomplete_chunks).insert(chunk, outcomes);
+            lock(&self.incomplete_chunks).insert(chunk, chunk_rows);
         }
         Ok(())
     }
@@ -244,24 +253,24 @@ impl OpenRun {
         let mut counts = NameCounts::new();
         let chunks = self.complete_chunks().clone();
         for chunk in chunks {
-            self.read_complete(chunk, |part| part.add_statuses(&mut counts))?;
+            self.read_complete_chunk(chunk, |part| part.add_status_counts(&mut counts))?;
         }
         Ok(counts)
     }
 
     /// Takes the stored rows of incomplete chunks, from which this process resumes them.
-    pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<PointRows>> {
+    pub fn take_incomplete_chunks(&self) -> BTreeMap<u64, Vec<PointRows>> {
         std::mem::take(&mut *lock(&self.incomplete_chunks))
     }
 
     /// Returns the number of chunks of the whole run.
-    pub const fn chunks(&self) -> u64 {
-        self.parts.chunks()
+    pub const fn chunk_count(&self) -> u64 {
+        self.point_parts.chunk_count()
     }
 
     /// Returns the points of a chunk.
     pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
-        self.parts.range(chunk)
+        self.point_parts.chunk_range(chunk)
     }
 
     /// Returns the number of points of a chunk.
@@ -272,7 +281,7 @@ impl OpenRun {
 
     /// Returns the chunk of a point.
     pub const fn chunk_of(&self, point: u64) -> u64 {
-        self.parts.chunk(point)
+        self.point_parts.chunk_of(point)
     }
 
     /// Returns the shard of this process; `None` if it computes the whole run.
@@ -280,13 +289,13 @@ impl OpenRun {
         self.shard.map(|(shard, _)| shard)
     }
 
-    fn owns(&self, chunk: u64) -> bool {
-        self.shard().is_none_or(|shard| shard.owns(chunk))
+    fn owns_chunk(&self, chunk: u64) -> bool {
+        self.shard().is_none_or(|shard| shard.owns_chunk(chunk))
     }
 
     /// Returns whether this process still has to compute a chunk.
     pub fn is_missing(&self, chunk: u64) -> bool {
-        self.owns(chunk) && !self.complete_chunks().contains(&chunk)
+        self.owns_chunk(chunk) && !self.complete_chunks().contains(&chunk)
     }
 
     fn complete_chunks(&self) -> MutexGuard<'_, BTreeSet<u64>> {
@@ -296,20 +305,23 @@ impl OpenRun {
     /// Returns the number of points that this process has to compute, and how many of them are
     /// stored.
     pub fn count_own_points(&self) -> (u64, u64) {
-        let chunks = self.chunks();
+        let chunks = self.chunk_count();
         let own_chunks = self.shard().map_or(chunks, |shard| shard.count_chunks(chunks));
         let full_chunk_points = self.chunk_length(0);
         // Every chunk of a run is full, except perhaps the last.
-        let missing_in_last = match chunks.checked_sub(1) {
-            Some(last) if self.owns(last) => full_chunk_points - self.chunk_length(last),
+        let missing_in_last_chunk = match chunks.checked_sub(1) {
+            Some(last) if self.owns_chunk(last) => full_chunk_points - self.chunk_length(last),
             _ => 0,
         };
-        let mut stored: u64 =
+        let mut stored_points: u64 =
             self.complete_chunks().iter().map(|&chunk| self.chunk_length(chunk)).sum();
         for rows in lock(&self.incomplete_chunks).values() {
-            stored += rows.len() as u64;
+            stored_points += rows.len() as u64;
         }
-        (own_chunks.saturating_mul(full_chunk_points).saturating_sub(missing_in_last), stored)
+        (
+            own_chunks.saturating_mul(full_chunk_points).saturating_sub(missing_in_last_chunk),
+            stored_points,
+        )
     }
 
     /// Takes the notes for the user: damaged chunks, a file system without locks.
@@ -323,23 +335,24 @@ impl OpenRun {
     /// # Errors
     /// [`StoreError::File`].
     pub fn record_session(&self, session: &Session) -> Result<(), StoreError> {
-        let name =
+        let file_name =
             format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
-        let path = self.folder.file(name.replace(['/', '\0'], "_"));
+        let path = self.folder.file(file_name.replace(['/', '\0'], "_"));
         Ok(atomic::write(&self.folder.path, &path, &format_json(&json!(session)))?)
     }
 
     /// Returns the error about the missing chunks and the shards to which they belong.
     pub fn incomplete_error(&self) -> Result<StoreError, StoreError> {
-        let chunks = self.chunks();
+        let chunks = self.chunk_count();
         let complete_chunks = self.complete_chunks();
         let layout = ShardLayout::read(&self.folder)?;
         Ok(StoreError::Incomplete {
             folder: self.folder.path.clone(),
             missing: chunks - complete_chunks.len() as u64,
             chunks,
-            missing_shards: layout
-                .map(|layout| shard::format_numbers(layout.incomplete(chunks, &complete_chunks))),
+            missing_shards: layout.map(|layout| {
+                shard::format_numbers(layout.incomplete_shards(chunks, &complete_chunks))
+            }),
         })
     }
 }
@@ -351,16 +364,16 @@ pub(super) fn read_part<T>(
     folder: &Folder,
     chunk: u64,
     read: impl FnOnce(&PointPart<'_>) -> Result<T, PartError>,
-) -> Result<Result<Option<T>, Damage>, StoreError> {
+) -> Result<Result<Option<T>, PartDamage>, StoreError> {
     let result = parts.open(folder, chunk).and_then(|part| part.as_ref().map(read).transpose());
-    PartError::damage(result)
+    PartError::separate_damage(result)
 }
 
 /// Renames a damaged part to `*.damaged`, and returns a note about it.
 pub(super) fn rename_damaged_part(
     folder: &Folder,
     index: u64,
-    damage: Damage,
+    damage: PartDamage,
 ) -> Result<String, StoreError> {
     let path = folder.file(part_name(index));
     let new_path = rename_damaged(&path)?;
@@ -370,28 +383,28 @@ pub(super) fn rename_damaged_part(
 }
 
 /// Returns the indices of the parts in a folder.
-pub(super) fn part_indices(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
-    let mut parts = BTreeSet::new();
+pub(super) fn list_part_indices(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
+    let mut indices = BTreeSet::new();
     for name in regular::file_names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        parts.extend(name.to_str().and_then(part_index));
+        indices.extend(name.to_str().and_then(part_index));
     }
-    Ok(parts)
+    Ok(indices)
 }
 
 /// Returns the result at the output after checks; `None` if there is none.
 ///
 /// # Errors
 /// [`StoreError::OutputDiffers`] if the file is of another plan or build.
-pub(super) fn finished_result(
+pub(super) fn find_finished_result(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
-    let Some((file, result)) = result_of_same_plan(folder, job)? else { return Ok(None) };
-    if let Some(difference) = column_difference(file.schema(), &job.layout.schema()) {
+    let Some((file, result)) = open_result_of_same_plan(folder, job)? else { return Ok(None) };
+    if let Some(difference) = find_column_difference(file.schema(), &job.layout.schema()) {
         let output = folder.output.clone();
         return Err(StoreError::OutputDiffers { output, differences: vec![difference] });
     }
-    let tally = read::tally(&file)?;
+    let tally = read::tally_rows(&file)?;
     Ok(Some((result, tally)))
 }
 
@@ -399,7 +412,7 @@ pub(super) fn finished_result(
 ///
 /// # Errors
 /// [`StoreError::OutputDiffers`] if the file is of another plan or build; [`FileError::Rewritten`].
-pub(super) fn result_of_same_plan(
+pub(super) fn open_result_of_same_plan(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ParquetFile, ResultFile)>, StoreError> {
@@ -412,7 +425,7 @@ pub(super) fn result_of_same_plan(
     let file = ParquetFile::open(&folder.output)?;
     let kind = job.layout.kind;
     let result = ResultFile::read(&file, kind).ok_or_else(|| {
-        read::refuse_content(&file, format!("its metadata is not that of a {}", kind.name()))
+        read::content_error(&file, format!("its metadata is not that of a {}", kind.name()))
     })?;
     if result.plan_hash == job.hash().to_hex().as_str() {
         // This build writes a digest into every result.
@@ -429,7 +442,7 @@ pub(super) fn result_of_same_plan(
 }
 
 /// Returns the difference between the columns of two builds for the same plan, if there is one.
-fn column_difference(older: &Schema, present: &Schema) -> Option<PlanDifference> {
+fn find_column_difference(older: &Schema, present: &Schema) -> Option<PlanDifference> {
     let [older, present] = [older, present].map(|schema| -> Vec<&str> {
         schema.fields().iter().map(|field| field.name().as_str()).collect()
     });
@@ -464,7 +477,7 @@ pub(super) fn claim_folder<T>(
         return Ok(OpenOutcome::Finished(result));
     }
     let lock = Lock::acquire(folder, shard()?)?;
-    let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
+    let mut notes: Vec<String> = lock.note_missing_locks(folder).into_iter().collect();
     if fresh {
         own_files::delete_own_files(folder)?;
     }
@@ -513,15 +526,15 @@ pub(super) fn refuse_other_plan(
 /// is returned as a note.
 pub(super) fn remove_folder(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
-    let removal = own_files::delete_own_files(folder).and_then(|remaining_files| {
+    let removal_result = own_files::delete_own_files(folder).and_then(|remaining_files| {
         lock.delete()?;
         if remaining_files.is_empty() {
-            let removal = regular::none_if_missing(fs::remove_dir(&folder.path));
-            removal.map_err(StoreError::io("remove the folder", &folder.path))?;
+            let removal_result = regular::none_if_missing(fs::remove_dir(&folder.path));
+            removal_result.map_err(StoreError::io("remove the folder", &folder.path))?;
         }
         Ok(remaining_files)
     });
-    match removal {
+    match removal_result {
         Ok(remaining_files) if remaining_files.is_empty() => None,
         Ok(remaining_files) => Some(format!(
             "the result is whole; {path} stays, for it holds what this run did not write or has \
@@ -539,11 +552,14 @@ pub(super) fn remove_folder(folder: &Folder, lock: Lock) -> Option<String> {
 fn abbreviate(names: &[OsString]) -> String {
     /// The number of names that are shown. Basis: a note of one line. Doubling it shows twice as
     /// many.
-    const MAX_NAMES: usize = 4;
-    let first_names: Vec<String> =
-        names.iter().take(MAX_NAMES).map(|name| name.to_string_lossy().into_owned()).collect();
-    match names.len().saturating_sub(MAX_NAMES) {
-        0 => first_names.join(", "),
-        hidden_count => format!("{} and {hidden_count} more", first_names.join(", ")),
+    const MAX_SHOWN_NAMES: usize = 4;
+    let shown_names: Vec<String> = names
+        .iter()
+        .take(MAX_SHOWN_NAMES)
+        .map(|name| name.to_string_lossy().into_owned())
+        .collect();
+    match names.len().saturating_sub(MAX_SHOWN_NAMES) {
+        0 => shown_names.join(", "),
+        hidden_count => format!("{} and {hidden_count} more", shown_names.join(", ")),
     }
 }

@@ -50,15 +50,15 @@ fn is_run_file(folder: &Folder, name: &OsStr) -> bool {
         SHARDS_FILE => matches!(ShardLayout::read(folder), Ok(Some(_))),
         _ if atomic::is_temporary(name) => true,
         _ if part_index(name).is_some() => part::is_part(&path),
-        _ if lock::shard_from_name(name).is_some() => lock::is_lock_file(&path),
-        _ if provenance::is_session_name(name) => is_record(&path),
+        _ if lock::shard_of_lock_name(name).is_some() => lock::is_lock_file(&path),
+        _ if provenance::is_session_name(name) => is_session_record(&path),
         _ => return false,
     };
     has_own_content || metadata.len() == 0
 }
 
 /// Returns whether a file is a process's record of its work.
-fn is_record(path: &Path) -> bool {
+fn is_session_record(path: &Path) -> bool {
     let text = regular::read_json(path).unwrap_or_default();
     serde_json::from_slice::<Session>(&text).is_ok()
 }

@@ -31,7 +31,7 @@ use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal}
 
 /// A reason why a file is not the expected part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Damage {
+pub(super) enum PartDamage {
     #[error("it is not as it was written")]
     Bytes,
     #[error("it belongs to another plan, index or version")]
@@ -44,13 +44,13 @@ pub(super) enum Damage {
 #[derive(Debug)]
 pub(super) enum PartError {
     /// The file is not the expected part.
-    Damaged(Damage),
+    Damaged(PartDamage),
     /// Reading the file failed.
     Failed(StoreError),
 }
 
-impl From<Damage> for PartError {
-    fn from(damage: Damage) -> Self {
+impl From<PartDamage> for PartError {
+    fn from(damage: PartDamage) -> Self {
         Self::Damaged(damage)
     }
 }
@@ -59,7 +59,7 @@ impl From<FileError> for PartError {
     fn from(error: FileError) -> Self {
         match error {
             FileError::Io { .. } => Self::Failed(error.into()),
-            _ => Self::Damaged(Damage::Bytes),
+            _ => Self::Damaged(PartDamage::Bytes),
         }
     }
 }
@@ -69,9 +69,11 @@ impl PartError {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub(super) fn damage<T>(result: Result<T, Self>) -> Result<Result<T, Damage>, StoreError> {
+    pub(super) fn separate_damage<T>(
+        result: Result<T, Self>,
+    ) -> Result<Result<T, PartDamage>, StoreError> {
         match result {
-            Ok(rows_or_value) => Ok(Ok(rows_or_value)),
+            Ok(value) => Ok(Ok(value)),
             Err(Self::Damaged(damage)) => Ok(Err(damage)),
             Err(Self::Failed(error)) => Err(error),
         }
@@ -81,7 +83,7 @@ impl PartError {
 /// The columns of a job's parts, and the hash of its plan.
 #[derive(Clone, Debug)]
 pub(super) struct PartSchema {
-    plan: String,
+    plan_hash: String,
     columns: Vec<DeclaredColumn>,
     schema: SchemaRef,
     properties: WriterProperties,
@@ -94,20 +96,21 @@ impl PartSchema {
         let metadata = vec![KeyValue::new(key::PLAN_HASH.to_owned(), plan.clone())];
         // A part is read once or twice, so compression and statistics would take more time than
         // they save.
-        let builder = schema::writer(job.version, metadata)
+        let builder = schema::common_writer_properties(job.version, metadata)
             .set_compression(Compression::UNCOMPRESSED)
             .set_statistics_enabled(EnabledStatistics::None)
             .set_offset_index_disabled(true)
             .set_max_row_group_row_count(None)
             .set_max_row_group_bytes(None)
             .set_dictionary_enabled(false);
-        let names = columns.iter().filter(|column| matches!(column.kind, CellType::Name(_)));
+        let name_columns =
+            columns.iter().filter(|column| matches!(column.cell_type, CellType::Name(_)));
         let enable_dictionary = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
             builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), true)
         };
-        let properties = names.fold(builder, enable_dictionary).build();
-        let fields: Vec<_> = columns.iter().map(DeclaredColumn::field).collect();
-        Self { plan, schema: Arc::new(Schema::new(fields)), columns, properties }
+        let properties = name_columns.fold(builder, enable_dictionary).build();
+        let fields: Vec<_> = columns.iter().map(DeclaredColumn::to_arrow_field).collect();
+        Self { plan_hash: plan, schema: Arc::new(Schema::new(fields)), columns, properties }
     }
 
     /// Encodes rows as a part. `entry` is the entry `sweep.part` of its metadata.
@@ -115,13 +118,12 @@ impl PartSchema {
     /// # Errors
     /// Returns the errors of the library, which are a defect of this program.
     pub(super) fn encode(&self, entry: &str, rows: &[RowCells]) -> Result<Vec<u8>, ParquetError> {
-        let arrays =
-            self.columns.iter().enumerate().map(|(k, column)| {
-                column.array(rows.iter().map(|row| row.get(k).copied().flatten()))
-            });
+        let arrays = self.columns.iter().enumerate().map(|(k, column)| {
+            column.to_array(rows.iter().map(|row| row.get(k).copied().flatten()))
+        });
         let arrays = arrays.collect::<Result<Vec<_>, ArrowError>>().map_err(from_arrow)?;
         let batch = RecordBatch::try_new(Arc::clone(&self.schema), arrays).map_err(from_arrow)?;
-        let write = || {
+        let write_unsealed = || {
             let mut writer = Writer::new(Vec::new(), &self.schema, self.properties.clone())?;
             writer.write(&batch)?;
             let mut writer = writer.end()?;
@@ -129,22 +131,24 @@ impl PartSchema {
             writer.append_key_value_metadata(seal::blank_digest());
             writer.into_inner()
         };
-        let mut file =
-            io::Cursor::new(panics::catch_in_parquet("the library gave up writing", write)?);
-        seal::seal(&mut file).map_err(|error| ParquetError::External(Box::new(error)))?;
-        Ok(file.into_inner())
+        let mut unsealed_file = io::Cursor::new(panics::catch_in_parquet(
+            "the library gave up writing",
+            write_unsealed,
+        )?);
+        seal::seal(&mut unsealed_file).map_err(|error| ParquetError::External(Box::new(error)))?;
+        Ok(unsealed_file.into_inner())
     }
 
     /// Opens the part at a path; `None` if there is no file. A part with another `entry` is damage.
     pub(super) fn open(&self, path: &Path, entry: &str) -> Result<Option<Part<'_>>, PartError> {
         let Some(file) = open_sealed(path)? else { return Ok(None) };
-        let has_same_plan = file.value(key::PLAN_HASH) == Some(&self.plan)
+        let has_same_plan = file.value(key::PLAN_HASH) == Some(&self.plan_hash)
             && file.value(key::PART) == Some(entry)
             && *file.schema() == self.schema;
         if has_same_plan {
             Ok(Some(Part { file, schema: self }))
         } else {
-            Err(Damage::Foreign.into())
+            Err(PartDamage::Foreign.into())
         }
     }
 
@@ -163,24 +167,24 @@ pub(super) struct Part<'a> {
 
 impl Part<'_> {
     /// Returns the number of rows.
-    pub(super) fn rows(&self) -> u64 {
+    pub(super) fn row_count(&self) -> u64 {
         self.file.rows()
     }
 
     /// Reads the columns at these positions, in batches.
-    pub(super) fn batches(&self, columns: Vec<usize>) -> Result<Vec<RecordBatch>, PartError> {
+    pub(super) fn read_batches(&self, columns: Vec<usize>) -> Result<Vec<RecordBatch>, PartError> {
         Ok(self.file.batches(columns)?.collect::<Result<_, FileError>>()?)
     }
 
     /// Reads the cells of the columns at these positions, row by row.
-    pub(super) fn cells(&self, columns: &[usize]) -> Result<Vec<RowCells>, PartError> {
+    pub(super) fn read_cells(&self, columns: &[usize]) -> Result<Vec<RowCells>, PartError> {
         let mut rows = Vec::new();
-        for batch in self.batches(columns.to_vec())? {
+        for batch in self.read_batches(columns.to_vec())? {
             let first = rows.len();
             rows.resize_with(first + batch.num_rows(), || RowCells::with_capacity(columns.len()));
             for (column, array) in columns.iter().zip(batch.columns()) {
                 let column = &self.schema.columns[*column];
-                let cells = column.cells(array).ok_or(Damage::Rows)?;
+                let cells = column.cells_from_array(array).ok_or(PartDamage::Rows)?;
                 rows[first..].iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
             }
         }
@@ -188,8 +192,8 @@ impl Part<'_> {
     }
 
     /// Reads the cells of all columns, row by row.
-    pub(super) fn all_cells(&self) -> Result<Vec<RowCells>, PartError> {
-        self.cells(&(0..self.schema.columns.len()).collect::<Vec<_>>())
+    pub(super) fn read_all_cells(&self) -> Result<Vec<RowCells>, PartError> {
+        self.read_cells(&(0..self.schema.columns.len()).collect::<Vec<_>>())
     }
 }
 
@@ -198,7 +202,7 @@ fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, PartError> {
     match ParquetFile::open(path) {
         Err(FileError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Ok(None),
         Ok(file) if file.is_sealed() => Ok(Some(file)),
-        Ok(_) => Err(Damage::Foreign.into()),
+        Ok(_) => Err(PartDamage::Foreign.into()),
         Err(error) => Err(error.into()),
     }
 }
@@ -207,8 +211,9 @@ fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, PartError> {
 pub(super) fn is_part(path: &Path) -> bool {
     let part = ParquetFile::open_unchecked(path).ok();
     part.is_some_and(|file| {
-        let is_ours = file.created_by().is_some_and(|creator| creator.starts_with(CREATED_BY));
-        is_ours && file.value(key::PART).is_some()
+        let is_from_this_program =
+            file.created_by().is_some_and(|creator| creator.starts_with(CREATED_BY));
+        is_from_this_program && file.value(key::PART).is_some()
     })
 }
 
@@ -217,11 +222,11 @@ pub(super) fn is_part(path: &Path) -> bool {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub(super) fn open_any(
+pub(super) fn open_part_of_plan(
     path: &Path,
     plan: &blake3::Hash,
 ) -> Result<Option<(ParquetFile, String)>, StoreError> {
-    let Ok(Some(file)) = PartError::damage(open_sealed(path))? else { return Ok(None) };
+    let Ok(Some(file)) = PartError::separate_damage(open_sealed(path))? else { return Ok(None) };
     let has_same_plan = file.value(key::PLAN_HASH) == Some(plan.to_hex().as_str());
     let entry = file.value(key::PART).map(str::to_owned);
     Ok(entry.filter(|_| has_same_plan).map(|entry| (file, entry)))

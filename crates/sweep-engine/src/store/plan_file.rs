@@ -13,7 +13,7 @@ use sweep_files::{atomic, regular};
 
 /// The version of the format of `plan.json`. Folders of other formats are refused as of another
 /// plan.
-const FORMAT: u32 = 3;
+const PLAN_FORMAT: u32 = 3;
 
 /// The content of `plan.json`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -50,7 +50,7 @@ pub(super) enum StoredPlan {
 impl PlanFile {
     pub(super) fn new(job: &Job<'_>) -> Self {
         Self {
-            format: FORMAT,
+            format: PLAN_FORMAT,
             version: job.version.to_owned(),
             numerics: job.numerics,
             plan_hash: job.hash().to_hex().to_string(),
@@ -71,7 +71,7 @@ impl PlanFile {
         // differences.
         let is_valid = |stored_plan: &Self| {
             let hash = plan_hash(&stored_plan.version, stored_plan.numerics, &stored_plan.plan);
-            stored_plan.format != FORMAT || hash.to_hex().as_str() == stored_plan.plan_hash
+            stored_plan.format != PLAN_FORMAT || hash.to_hex().as_str() == stored_plan.plan_hash
         };
         Ok(match serde_json::from_slice::<Self>(&text) {
             Ok(stored_plan) if is_valid(&stored_plan) => StoredPlan::Plan(Box::new(stored_plan)),

@@ -9,24 +9,24 @@ use std::ops::Range;
 use arrow_array::RecordBatch;
 use serde_json::{Value, json};
 
-use super::part::{Damage, Part, PartError, PartSchema};
+use super::part::{Part, PartDamage, PartError, PartSchema};
 use super::read::{NameCounts, count_name};
-use super::schema::{CellType, POINT};
+use super::schema::{CellType, POINT_COLUMN};
 use super::{
     DeclaredColumn, Folder, Job, Layout, PointRows, RowCells, StoreError, chunk_points, part_name,
 };
 
 /// The name of the column of the numbers by which the engine identifies rows.
-const ROW_INDEX: &str = "row_index";
+const ROW_INDEX_COLUMN: &str = "row_index";
 
 /// The maximum number of rows of a point. Basis: `sweep dwell` can return 256 states of each of 32
 /// motions. Doubling it doubles the memory that a part may take.
-const MAX_POINT_ROWS: usize = 32 * 256;
+const MAX_ROWS_PER_POINT: usize = 32 * 256;
 
 /// The schema of a run's parts, and the division of its points into chunks.
 #[derive(Clone, Debug)]
 pub(super) struct PointParts {
-    parts: PartSchema,
+    part_schema: PartSchema,
     layout: Layout,
     /// The position of each of the model's columns in a part.
     column_positions: Vec<usize>,
@@ -38,45 +38,49 @@ impl PointParts {
     /// Returns the schema and the chunks of a job.
     pub(super) fn new(job: &Job<'_>) -> Self {
         let layout = job.layout.clone();
-        let is_kept = |column: &&DeclaredColumn| column.kind == CellType::Kept;
+        let is_in_parts_only = |column: &&DeclaredColumn| column.cell_type == CellType::Kept;
         let mut columns: Vec<DeclaredColumn> = layout.all_columns().cloned().collect();
-        let mut next_in_result = 1 + layout.axes.len();
-        let mut next_kept = columns.len();
+        let mut next_result_position = 1 + layout.axes.len();
+        let mut next_part_position = columns.len();
         let mut column_positions = Vec::with_capacity(layout.columns.len());
         for column in &layout.columns {
-            let next_position = if is_kept(&column) { &mut next_kept } else { &mut next_in_result };
+            let next_position = if is_in_parts_only(&column) {
+                &mut next_part_position
+            } else {
+                &mut next_result_position
+            };
             column_positions.push(*next_position);
             *next_position += 1;
         }
-        columns.extend(layout.columns.iter().filter(is_kept).cloned());
+        columns.extend(layout.columns.iter().filter(is_in_parts_only).cloned());
         if layout.tasks_per_point > 1 {
             let description = "number that an unfinished run knows the row by";
-            columns.push(DeclaredColumn::new(ROW_INDEX, "1", description, CellType::Count));
+            columns.push(DeclaredColumn::new(ROW_INDEX_COLUMN, "1", description, CellType::Count));
         }
         let parts = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
-        Self { parts, layout, column_positions, points: job.points, chunk_points }
+        Self { part_schema: parts, layout, column_positions, points: job.points, chunk_points }
     }
 
     /// Returns the number of chunks of the whole run.
-    pub(super) const fn chunks(&self) -> u64 {
+    pub(super) const fn chunk_count(&self) -> u64 {
         self.points.div_ceil(self.chunk_points)
     }
 
     /// Returns the points of a chunk.
-    pub(super) fn range(&self, chunk: u64) -> Range<u64> {
+    pub(super) fn chunk_range(&self, chunk: u64) -> Range<u64> {
         let first = chunk.saturating_mul(self.chunk_points).min(self.points);
         first..first.saturating_add(self.chunk_points).min(self.points)
     }
 
     /// Returns the chunk that a point is in.
-    pub(super) const fn chunk(&self, point: u64) -> u64 {
+    pub(super) const fn chunk_of(&self, point: u64) -> u64 {
         point / self.chunk_points
     }
 
     /// Returns the entry in a part's metadata that gives its chunk.
     fn part_entry(&self, chunk: u64) -> String {
-        let Range { start, end } = self.range(chunk);
+        let Range { start, end } = self.chunk_range(chunk);
         json!({ "index": chunk, "from": start, "to": end }).to_string()
     }
 
@@ -88,43 +92,48 @@ impl PointParts {
         &self,
         job: &Job<'_>,
         chunk: u64,
-        outcomes: &[PointRows],
+        point_rows_list: &[PointRows],
     ) -> Result<Vec<u8>, StoreError> {
-        let points = self.range(chunk);
-        let reject = |reason: String| StoreError::Engine {
+        let points = self.chunk_range(chunk);
+        let engine_error = |reason: String| StoreError::Engine {
             first: points.start,
             last: points.end.saturating_sub(1),
             reason,
         };
-        if !are_ordered(&points, outcomes.iter().map(|outcome| outcome.point)) {
-            return Err(reject(format!("{} outcomes that are not of its points", outcomes.len())));
+        if !are_ordered(&points, point_rows_list.iter().map(|outcome| outcome.point)) {
+            return Err(engine_error(format!(
+                "{} outcomes that are not of its points",
+                point_rows_list.len()
+            )));
         }
         let columns = &self.layout.columns;
-        let mut rows = Vec::with_capacity(outcomes.len());
-        for PointRows { point, rows: point_rows } in outcomes {
-            if point_rows.is_empty() || point_rows.len() > MAX_POINT_ROWS {
+        let mut rows = Vec::with_capacity(point_rows_list.len());
+        for PointRows { point, rows: point_rows } in point_rows_list {
+            if point_rows.is_empty() || point_rows.len() > MAX_ROWS_PER_POINT {
                 let count = point_rows.len();
-                return Err(reject(format!("point {point}: {count} rows of {MAX_POINT_ROWS}")));
+                return Err(engine_error(format!(
+                    "point {point}: {count} rows of {MAX_ROWS_PER_POINT}"
+                )));
             }
-            let axes: Vec<f64> = (job.axis_values)(*point);
+            let axis_values: Vec<f64> = (job.axis_values)(*point);
             for cells in point_rows {
-                let fits = cells.len() == columns.len()
-                    && columns.iter().zip(cells).all(|(column, cell)| column.accepts(*cell));
-                if !fits {
-                    return Err(reject(format!("point {point}: a row that does not fit")));
+                let is_valid_row = cells.len() == columns.len()
+                    && columns.iter().zip(cells).all(|(column, cell)| column.accepts_cell(*cell));
+                if !is_valid_row {
+                    return Err(engine_error(format!("point {point}: a row that does not fit")));
                 }
-                rows.push(self.part_row(*point, &axes, cells));
+                rows.push(self.part_row(*point, &axis_values, cells));
             }
         }
-        let bytes = self.parts.encode(&self.part_entry(chunk), &rows);
-        bytes.map_err(|error| reject(error.to_string()))
+        let bytes = self.part_schema.encode(&self.part_entry(chunk), &rows);
+        bytes.map_err(|error| engine_error(error.to_string()))
     }
 
     /// Returns a row with a cell for each column of a part.
-    fn part_row(&self, point: u64, axes: &[f64], cells: &RowCells) -> RowCells {
-        let mut row: RowCells = vec![None; self.parts.column_count()];
+    fn part_row(&self, point: u64, axis_values: &[f64], cells: &RowCells) -> RowCells {
+        let mut row: RowCells = vec![None; self.part_schema.column_count()];
         row[0] = Some(point / self.layout.tasks_per_point);
-        for (cell, value) in row[1..].iter_mut().zip(axes).take(self.layout.axes.len()) {
+        for (cell, value) in row[1..].iter_mut().zip(axis_values).take(self.layout.axes.len()) {
             *cell = Some(value.to_bits());
         }
         for (position, cell) in self.column_positions.iter().zip(cells) {
@@ -143,26 +152,28 @@ impl PointParts {
         chunk: u64,
     ) -> Result<Option<PointPart<'_>>, PartError> {
         let path = folder.file(part_name(chunk));
-        let Some(part) = self.parts.open(&path, &self.part_entry(chunk))? else { return Ok(None) };
-        let range = self.range(chunk);
-        let max_rows = (range.end - range.start).saturating_mul(MAX_POINT_ROWS as u64);
-        if part.rows() > max_rows {
-            return Err(Damage::Rows.into());
+        let Some(part) = self.part_schema.open(&path, &self.part_entry(chunk))? else {
+            return Ok(None);
+        };
+        let range = self.chunk_range(chunk);
+        let max_rows = (range.end - range.start).saturating_mul(MAX_ROWS_PER_POINT as u64);
+        if part.row_count() > max_rows {
+            return Err(PartDamage::Rows.into());
         }
-        let numbers = part.cells(&[self.number_column_position()])?;
-        let mut points: Vec<u64> = numbers.into_iter().filter_map(|row| row[0]).collect();
+        let row_numbers = part.read_cells(&[self.number_column_position()])?;
+        let mut points: Vec<u64> = row_numbers.into_iter().filter_map(|row| row[0]).collect();
         if self.layout.has_several_rows {
             points.dedup();
         }
         if !are_ordered(&range, points.iter().copied()) {
-            return Err(Damage::Rows.into());
+            return Err(PartDamage::Rows.into());
         }
         Ok(Some(PointPart { parts: self, part, points }))
     }
 
     /// Returns the position of the column of the numbers by which the engine identifies rows.
     const fn number_column_position(&self) -> usize {
-        if self.layout.tasks_per_point > 1 { self.parts.column_count() - 1 } else { 0 }
+        if self.layout.tasks_per_point > 1 { self.part_schema.column_count() - 1 } else { 0 }
     }
 }
 
@@ -182,32 +193,32 @@ pub(super) struct PointPart<'a> {
 
 impl PointPart<'_> {
     /// Returns the number of points.
-    pub(super) const fn points(&self) -> u64 {
+    pub(super) const fn point_count(&self) -> u64 {
         self.points.len() as u64
     }
 
     /// Reads the points with their rows.
-    pub(super) fn outcomes(&self) -> Result<Vec<PointRows>, PartError> {
+    pub(super) fn read_point_rows(&self) -> Result<Vec<PointRows>, PartError> {
         let column_positions =
             [&[self.parts.number_column_position()], &self.parts.column_positions[..]].concat();
-        let mut outcomes: Vec<PointRows> = Vec::with_capacity(self.points.len());
-        for mut row in self.part.cells(&column_positions)? {
+        let mut point_rows_list: Vec<PointRows> = Vec::with_capacity(self.points.len());
+        for mut row in self.part.read_cells(&column_positions)? {
             let cells = row.split_off(1);
             let point = row[0].unwrap_or_default();
-            match outcomes.last_mut() {
+            match point_rows_list.last_mut() {
                 Some(last) if last.point == point => last.rows.push(cells),
-                _ => outcomes.push(PointRows { point, rows: vec![cells] }),
+                _ => point_rows_list.push(PointRows { point, rows: vec![cells] }),
             }
         }
-        Ok(outcomes)
+        Ok(point_rows_list)
     }
 
     /// Counts rows by status.
-    pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), PartError> {
+    pub(super) fn add_status_counts(&self, counts: &mut NameCounts) -> Result<(), PartError> {
         let PointParts { layout, column_positions, .. } = self.parts;
-        let Some(status) = layout.position("status") else { return Ok(()) };
-        let CellType::Name(names) = &layout.columns[status].kind else { return Ok(()) };
-        for row in self.part.cells(&[column_positions[status]])? {
+        let Some(status_column) = layout.position("status") else { return Ok(()) };
+        let CellType::Name(names) = &layout.columns[status_column].cell_type else { return Ok(()) };
+        for row in self.part.read_cells(&[column_positions[status_column]])? {
             let name = row[0].and_then(|name| names.get(name as usize));
             name.into_iter().for_each(|name| count_name(counts, name));
         }
@@ -215,8 +226,8 @@ impl PointPart<'_> {
     }
 
     /// Reads the rows in the columns of the result.
-    pub(super) fn result_batches(&self) -> Result<Vec<RecordBatch>, PartError> {
-        self.part.batches((0..self.parts.layout.all_columns().count()).collect())
+    pub(super) fn read_result_batches(&self) -> Result<Vec<RecordBatch>, PartError> {
+        self.part.read_batches((0..self.parts.layout.all_columns().count()).collect())
     }
 }
 
@@ -227,6 +238,6 @@ pub(super) fn is_part_of_run(entry: &str) -> bool {
 
 /// Returns the name of the column that numbers the rows of a part: points, or tasks if a point has
 /// several. `has` returns whether the part has a column.
-pub(super) fn number_column(has: impl Fn(&str) -> bool) -> &'static str {
-    if has(ROW_INDEX) { ROW_INDEX } else { POINT }
+pub(super) fn row_number_column(has: impl Fn(&str) -> bool) -> &'static str {
+    if has(ROW_INDEX_COLUMN) { ROW_INDEX_COLUMN } else { POINT_COLUMN }
 }

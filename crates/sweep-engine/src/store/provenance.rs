@@ -42,13 +42,13 @@ pub struct Session {
 
 /// Returns the content of the sidecar: the counts of the result, this session, and the recorded
 /// sessions of other processes. A killed process has no recorded session.
-pub fn sidecar(
+pub fn sidecar_content(
     folder: &Folder,
     job: &Job<'_>,
     tally: &Tally,
     session: Option<Session>,
 ) -> Result<Vec<u8>, StoreError> {
-    let mut sessions = recorded_sessions(folder)?;
+    let mut sessions = read_recorded_sessions(folder)?;
     sessions.extend(session);
     sessions.sort_by(|a, b| {
         (a.started_unix_s, &a.host, a.pid).cmp(&(b.started_unix_s, &b.host, b.pid))
@@ -75,7 +75,7 @@ pub fn sidecar(
 }
 
 /// Reads the recorded sessions, without those that cannot be read.
-fn recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
+fn read_recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
     for name in regular::file_names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_session_name) {

@@ -46,7 +46,7 @@ impl ResultFile {
 }
 
 /// Returns the error about a file with other content than expected.
-pub(super) fn refuse_content(file: &ParquetFile, reason: String) -> StoreError {
+pub(super) fn content_error(file: &ParquetFile, reason: String) -> StoreError {
     StoreError::parquet("read", file.path())(ParquetError::General(reason))
 }
 
@@ -74,7 +74,7 @@ pub struct ColumnExtreme {
     pub rows_beyond_limit: u64,
     /// The worst value and its point; `None` if no row has a value.
     #[serde(flatten)]
-    pub worst: Option<Extreme>,
+    pub worst_value: Option<Extreme>,
 }
 
 impl ColumnExtreme {
@@ -83,15 +83,15 @@ impl ColumnExtreme {
         let ColumnMetadata { worse, limit, is_in_summary, .. } = column.metadata;
         let worse = worse.filter(|_| is_in_summary)?;
         let name = column.name.clone();
-        Some(Self { column: name, worse, limit, rows_beyond_limit: 0, worst: None })
+        Some(Self { column: name, worse, limit, rows_beyond_limit: 0, worst_value: None })
     }
 
     /// Adds the value at a point.
     fn add(&mut self, value: f64, point: u64) {
         let is_worse = |reference: f64| self.worse.excess(value, reference) > 0.0;
         self.rows_beyond_limit += u64::from(self.limit.is_some_and(is_worse));
-        if !value.is_nan() && self.worst.as_ref().is_none_or(|worst| is_worse(worst.value)) {
-            self.worst = Some(Extreme { value, point });
+        if !value.is_nan() && self.worst_value.as_ref().is_none_or(|worst| is_worse(worst.value)) {
+            self.worst_value = Some(Extreme { value, point });
         }
     }
 }
@@ -157,8 +157,8 @@ pub fn count_name(counts: &mut NameCounts, name: &str) {
 
 /// Returns the condition under which ratios are null, by the description of their first column.
 fn null_condition_of_ratios(columns: &[Column]) -> Option<String> {
-    let ratio = columns.iter().find(|column| column.name.starts_with("ratio_"))?;
-    let (_, condition) = ratio.metadata.description.rsplit_once("; ")?;
+    let ratio_column = columns.iter().find(|column| column.name.starts_with("ratio_"))?;
+    let (_, condition) = ratio_column.metadata.description.rsplit_once("; ")?;
     condition.starts_with("null ").then(|| condition.to_owned())
 }
 
@@ -166,10 +166,10 @@ fn null_condition_of_ratios(columns: &[Column]) -> Option<String> {
 ///
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
-pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    let fields = file.schema().fields().iter().map(|field| field.name().as_str());
-    let ratio_names = fields.clone().filter(|name| name.starts_with("ratio_"));
-    let has_column = |name: &str| fields.clone().any(|field| field == name);
+pub fn tally_rows(file: &ParquetFile) -> Result<Tally, StoreError> {
+    let field_names = file.schema().fields().iter().map(|field| field.name().as_str());
+    let ratio_names = field_names.clone().filter(|name| name.starts_with("ratio_"));
+    let has_column = |name: &str| field_names.clone().any(|field| field == name);
     // Files of other kinds, such as responses at held speeds, have no verdicts.
     let has_verdicts = file.kind() == Some(FileKind::Map);
     let required_columns = match has_verdicts {
@@ -177,7 +177,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         false => &["point", "status"],
     };
     if let Some(name) = required_columns.iter().find(|name| !has_column(name)) {
-        return Err(refuse_content(file, format!("there is no column `{name}`")));
+        return Err(content_error(file, format!("there is no column `{name}`")));
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     let over_estimate_limit = limits.map_or(0.0, RatioLimits::over_estimate);
@@ -187,12 +187,12 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         .iter()
         .filter_map(|column| Some((column.name.as_str(), ColumnExtreme::new(column)?)))
         .unzip();
-    let mut names: Vec<&str> = ratio_names.collect();
-    let ratio_count = names.len();
-    names.extend(marked_names);
+    let mut read_columns: Vec<&str> = ratio_names.collect();
+    let ratio_count = read_columns.len();
+    read_columns.extend(marked_names);
     let mut add_column = |name| {
-        names.push(name);
-        names.len() - 1
+        read_columns.push(name);
+        read_columns.len() - 1
     };
     let [point_column, status_column, method_column] =
         ["point", "status", "method"].map(&mut add_column);
@@ -200,8 +200,8 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let [error_column, converged_column, ratio_column] =
         ["error", "converged", "ratio_max"].map(&mut add_column);
     let mut tally = Tally::default();
-    file.each_row(&names, |row| {
-        let flag = |column| row.cell(column).flag();
+    file.each_row(&read_columns, |row| {
+        let flag_cell = |column| row.cell(column).flag();
         tally.points += 1;
         let point = row.value(point_column) as u64;
         if let Some(name) = row.word(status_column) {
@@ -216,34 +216,34 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         if !has_verdicts {
             return Ok(());
         }
-        let least = (0..ratio_count).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
-        let reliable = flag(reliable_column);
-        match reliable {
+        let least_ratio = (0..ratio_count).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
+        let is_reliable = flag_cell(reliable_column);
+        match is_reliable {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
             None => tally.undefined += 1,
         }
-        if reliable.is_none() && row.word(status_column) == Some("ok") {
+        if is_reliable.is_none() && row.word(status_column) == Some("ok") {
             tally.undefined_without_failure += 1;
             tally.first_undefined_without_failure.get_or_insert(point);
         }
-        tally.over_estimated += u64::from(least < over_estimate_limit);
+        tally.over_estimated += u64::from(least_ratio < over_estimate_limit);
         tally.over_estimated_reliable +=
-            u64::from(least < over_estimate_limit && reliable == Some(true));
-        tally.sensitive += u64::from(flag(sensitive_column) == Some(true));
-        tally.unconverged += u64::from(flag(converged_column) == Some(false));
+            u64::from(least_ratio < over_estimate_limit && is_reliable == Some(true));
+        tally.sensitive += u64::from(flag_cell(sensitive_column) == Some(true));
+        tally.unconverged += u64::from(flag_cell(converged_column) == Some(false));
         row.word(method_column).into_iter().for_each(|name| count_name(&mut tally.by_method, name));
-        let keep_greatest = |greatest: &mut Option<Extreme>, value: f64| {
+        let keep_if_greatest = |greatest: &mut Option<Extreme>, value: f64| {
             let is_greatest = greatest.as_ref().is_none_or(|greatest| value > greatest.value);
             if is_greatest && !value.is_nan() {
                 *greatest = Some(Extreme { value, point });
             }
         };
         // The error of a failed row has no meaning.
-        let error =
+        let row_error =
             if row.word(status_column) == Some("ok") { row.value(error_column) } else { f64::NAN };
-        keep_greatest(&mut tally.greatest_error, error);
-        keep_greatest(&mut tally.greatest_ratio, row.value(ratio_column));
+        keep_if_greatest(&mut tally.greatest_error, row_error);
+        keep_if_greatest(&mut tally.greatest_ratio, row.value(ratio_column));
         Ok::<(), StoreError>(())
     })?;
     tally.extremes = extremes;
@@ -272,7 +272,7 @@ pub struct ColumnRange {
     /// The metadata of the column's field.
     pub metadata: ColumnMetadata,
     /// The number of rows without a value.
-    pub nulls: u64,
+    pub null_count: u64,
     /// The least and the greatest value, if there are numbers.
     pub range: Option<(f64, f64)>,
     /// The values of a text or bool column with their numbers of occurrences: the first
@@ -286,11 +286,11 @@ const MAX_COUNTED_WORDS: usize = 16;
 
 /// The content of any Parquet file in short.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Overview {
+pub struct FileOverview {
     /// The metadata of a result, if the file is a result of `sweep run`.
     pub result: Option<ResultFile>,
     /// The number of rows.
-    pub rows: u64,
+    pub row_count: u64,
     /// The columns in the order of the file.
     pub columns: Vec<ColumnRange>,
 }
@@ -299,11 +299,11 @@ pub struct Overview {
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub fn read_overview(file: &ParquetFile) -> Result<Overview, StoreError> {
+pub fn read_overview(file: &ParquetFile) -> Result<FileOverview, StoreError> {
     let empty_range = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         metadata: ColumnMetadata::from_field(field),
-        nulls: 0,
+        null_count: 0,
         range: None,
         word_counts: Vec::new(),
     };
@@ -317,9 +317,9 @@ pub fn read_overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         }
         Ok::<(), StoreError>(())
     })?;
-    Ok(Overview {
+    Ok(FileOverview {
         result: ResultFile::read(file, FileKind::Map),
-        rows: file.rows(),
+        row_count: file.rows(),
         columns: ranges,
     })
 }
@@ -333,7 +333,7 @@ impl ColumnRange {
             return;
         }
         let Some(word) = word else {
-            self.nulls += 1;
+            self.null_count += 1;
             return;
         };
         if let Some((_, count)) = self.word_counts.iter_mut().find(|(known, _)| known == word) {

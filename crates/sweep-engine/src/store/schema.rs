@@ -30,7 +30,7 @@ pub const ROW_GROUP_ROWS: usize = 1 << 17;
 pub const BATCH_ROWS: usize = 1 << 12;
 
 /// The name of the column of point indices.
-pub(super) const POINT: &str = "point";
+pub(super) const POINT_COLUMN: &str = "point";
 
 /// The type of a column's cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ pub struct DeclaredColumn {
     /// The metadata of the column's field.
     pub metadata: ColumnMetadata,
     /// The type of the cells.
-    pub kind: CellType,
+    pub cell_type: CellType,
     /// The difference from the column's limit that is as important as a factor of e is for a ratio,
     /// in the column's unit; `None` without a limit.
     pub limit_scale: Option<f64>,
@@ -125,12 +125,12 @@ impl DeclaredColumn {
         let description = description.into();
         let metadata =
             ColumnMetadata { unit: unit.into(), description, ..ColumnMetadata::default() };
-        Self { name: name.into(), metadata, kind, limit_scale: None }
+        Self { name: name.into(), metadata, cell_type: kind, limit_scale: None }
     }
 
     /// Returns the number in a cell; `None` for null, flags and names.
     pub fn number(&self, cell: Option<u64>) -> Option<f64> {
-        match self.kind {
+        match self.cell_type {
             CellType::Count | CellType::KnownCount => cell.map(|count| count as f64),
             CellType::Measured | CellType::Axis | CellType::Time | CellType::Kept => {
                 cell.map(f64::from_bits)
@@ -139,15 +139,16 @@ impl DeclaredColumn {
         }
     }
 
-    pub(super) fn field(&self) -> Field {
-        let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        let (data_type, nullable) = match self.kind {
+    pub(super) fn to_arrow_field(&self) -> Field {
+        let dictionary_type =
+            || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (data_type, nullable) = match self.cell_type {
             CellType::Count => (DataType::UInt64, false),
             CellType::KnownCount => (DataType::UInt64, true),
             CellType::Axis => (DataType::Float64, false),
             CellType::Measured | CellType::Time | CellType::Kept => (DataType::Float64, true),
             CellType::Flag => (DataType::Boolean, true),
-            CellType::Name(_) => (names(), true),
+            CellType::Name(_) => (dictionary_type(), true),
         };
         self.arrow_field(data_type, nullable)
     }
@@ -159,11 +160,11 @@ impl DeclaredColumn {
 
     /// Returns the array of the column's cells. A missing count becomes 0, and a missing axis value
     /// NaN.
-    pub(super) fn array(
+    pub(super) fn to_array(
         &self,
         cells: impl Iterator<Item = Option<u64>>,
     ) -> Result<ArrayRef, ArrowError> {
-        Ok(match &self.kind {
+        Ok(match &self.cell_type {
             CellType::Count => {
                 Arc::new(UInt64Array::from_iter_values(cells.map(Option::unwrap_or_default)))
             }
@@ -178,17 +179,18 @@ impl DeclaredColumn {
                 Arc::new(cells.map(|cell| cell.map(|flag| flag != 0)).collect::<BooleanArray>())
             }
             CellType::Name(names) => {
-                let keys: Int32Array = cells.map(|name| i32::try_from(name?).ok()).collect();
+                let name_indices: Int32Array =
+                    cells.map(|name| i32::try_from(name?).ok()).collect();
                 let names = StringArray::from_iter_values(names);
-                Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
+                Arc::new(DictionaryArray::<Int32Type>::try_new(name_indices, Arc::new(names))?)
             }
         })
     }
 
-    /// Returns the cells of an array, as the inverse of [`DeclaredColumn::array`]; `None` for an
+    /// Returns the cells of an array, as the inverse of [`DeclaredColumn::to_array`]; `None` for an
     /// array of another type.
-    pub(super) fn cells(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
-        let cells: Vec<Option<u64>> = match &self.kind {
+    pub(super) fn cells_from_array(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
+        let cells: Vec<Option<u64>> = match &self.cell_type {
             CellType::Count | CellType::KnownCount => {
                 array.as_primitive_opt::<UInt64Type>()?.iter().collect()
             }
@@ -201,21 +203,22 @@ impl DeclaredColumn {
             }
             CellType::Name(names) => {
                 let dictionary = array.as_dictionary_opt::<Int32Type>()?;
-                let words = dictionary.values().as_string_opt::<i32>()?.iter();
-                let index = |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
-                let indices: Vec<u64> = words
-                    .map(|word| index(word).map(|index| index as u64))
+                let dictionary_words = dictionary.values().as_string_opt::<i32>()?.iter();
+                let name_index =
+                    |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
+                let indices: Vec<u64> = dictionary_words
+                    .map(|word| name_index(word).map(|name_index| name_index as u64))
                     .collect::<Option<_>>()?;
-                let cell = |key: Option<i32>| key.map(|key| indices[key as usize]);
-                dictionary.keys().iter().map(cell).collect()
+                let cell_of_key = |key: Option<i32>| key.map(|key| indices[key as usize]);
+                dictionary.keys().iter().map(cell_of_key).collect()
             }
         };
         Some(cells)
     }
 
     /// Returns whether a cell fits the type of the column.
-    pub(super) fn accepts(&self, cell: Option<u64>) -> bool {
-        match (&self.kind, cell) {
+    pub(super) fn accepts_cell(&self, cell: Option<u64>) -> bool {
+        match (&self.cell_type, cell) {
             (CellType::Count | CellType::Axis, cell) => cell.is_some(),
             (_, None)
             | (CellType::KnownCount | CellType::Measured | CellType::Time | CellType::Kept, _) => {
@@ -237,16 +240,19 @@ impl Layout {
     /// columns.
     pub(super) fn all_columns(&self) -> impl Iterator<Item = &DeclaredColumn> + Clone {
         /// The column of point indices.
-        static POINTS: std::sync::LazyLock<DeclaredColumn> = std::sync::LazyLock::new(|| {
-            DeclaredColumn::new(POINT, "1", "index in grid order", CellType::Count)
-        });
-        let columns = self.columns.iter().filter(|column| column.kind != CellType::Kept);
-        std::iter::once(&*POINTS).chain(&self.axes).chain(columns)
+        static POINT_INDEX_COLUMN: std::sync::LazyLock<DeclaredColumn> =
+            std::sync::LazyLock::new(|| {
+                DeclaredColumn::new(POINT_COLUMN, "1", "index in grid order", CellType::Count)
+            });
+        let columns = self.columns.iter().filter(|column| column.cell_type != CellType::Kept);
+        std::iter::once(&*POINT_INDEX_COLUMN).chain(&self.axes).chain(columns)
     }
 
     /// Returns the Arrow schema.
     pub fn schema(&self) -> SchemaRef {
-        Arc::new(Schema::new(self.all_columns().map(DeclaredColumn::field).collect::<Vec<_>>()))
+        Arc::new(Schema::new(
+            self.all_columns().map(DeclaredColumn::to_arrow_field).collect::<Vec<_>>(),
+        ))
     }
 
     /// Returns the number in a row's cell of a column; `None` for null, flags and names, and
@@ -259,7 +265,7 @@ impl Layout {
     /// Returns the truth value in a row's cell of a column; `None` for null, and without such a
     /// column.
     pub fn flag(&self, row: &RowCells, column: &str) -> Option<bool> {
-        let k = self.position(column).filter(|k| self.columns[*k].kind == CellType::Flag)?;
+        let k = self.position(column).filter(|k| self.columns[*k].cell_type == CellType::Flag)?;
         row.get(k)?.map(|flag| flag != 0)
     }
 
@@ -267,7 +273,7 @@ impl Layout {
     /// names.
     pub fn name(&self, row: &RowCells, column: &str) -> Option<&'static str> {
         let k = self.position(column)?;
-        let CellType::Name(names) = &self.columns[k].kind else { return None };
+        let CellType::Name(names) = &self.columns[k].cell_type else { return None };
         names.get((*row.get(k)?)? as usize).copied()
     }
 
@@ -279,30 +285,34 @@ impl Layout {
 
 /// Returns the settings of the writer and the metadata of a result. They do not depend on time,
 /// host or progress of the run.
-pub fn properties(job: &Job<'_>) -> WriterProperties {
+pub fn result_writer_properties(job: &Job<'_>) -> WriterProperties {
     let metadata_entry = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
-    let mut metadata = vec![
+    let mut metadata_entries = vec![
         metadata_entry(key::PLAN, job.plan.to_string()),
         metadata_entry(key::PLAN_HASH, job.hash().to_hex().to_string()),
         metadata_entry(key::VERSION, job.version.to_owned()),
         metadata_entry(key::NUMERICS, job.numerics.to_string()),
     ];
-    metadata.extend(
+    metadata_entries.extend(
         job.layout.metadata.iter().map(|(key, value)| metadata_entry(key, value.to_string())),
     );
-    let builder = writer(job.version, metadata)
+    let builder = common_writer_properties(job.version, metadata_entries)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_max_row_group_bytes(None);
     // A dictionary of numbers that hardly repeat would be built and then discarded.
-    let measured = job.layout.all_columns().filter(|column| column.kind == CellType::Measured);
+    let measured_columns =
+        job.layout.all_columns().filter(|column| column.cell_type == CellType::Measured);
     let disable_dictionary = |builder: WriterPropertiesBuilder, column: &DeclaredColumn| {
         builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
     };
-    measured.fold(builder, disable_dictionary).build()
+    measured_columns.fold(builder, disable_dictionary).build()
 }
 
 /// Returns the settings of the writer that all files of this program share.
-pub(crate) fn writer(version: &str, metadata: Vec<KeyValue>) -> WriterPropertiesBuilder {
+pub(crate) fn common_writer_properties(
+    version: &str,
+    metadata: Vec<KeyValue>,
+) -> WriterPropertiesBuilder {
     WriterProperties::builder()
         // The library's default contains its version, so that an upgrade would change the bytes.
         .set_created_by(format!("{CREATED_BY}{version}"))
@@ -311,14 +321,14 @@ pub(crate) fn writer(version: &str, metadata: Vec<KeyValue>) -> WriterProperties
 }
 
 /// A builder of batches from rows.
-pub struct ResultRows<'a> {
+pub struct BatchBuilder<'a> {
     layout: &'a Layout,
     schema: SchemaRef,
     /// The rows, each with the number of its point and the values of the axes.
     rows: Vec<(u64, Vec<f64>, RowCells)>,
 }
 
-impl<'a> ResultRows<'a> {
+impl<'a> BatchBuilder<'a> {
     /// Creates a builder without rows.
     pub fn new(layout: &'a Layout) -> Self {
         Self::with_schema(layout, layout.schema())
@@ -336,7 +346,7 @@ impl<'a> ResultRows<'a> {
     }
 
     /// Adds a row of a point with the values of the axes.
-    pub fn push(&mut self, point: u64, axis_values: Vec<f64>, row: RowCells) {
+    pub fn push_row(&mut self, point: u64, axis_values: Vec<f64>, row: RowCells) {
         self.rows.push((point, axis_values, row));
     }
 
@@ -344,22 +354,27 @@ impl<'a> ResultRows<'a> {
     ///
     /// # Errors
     /// Rows that do not fit the layout.
-    pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+    pub fn take_batch(&mut self) -> Result<RecordBatch, ArrowError> {
         let rows = &self.rows;
         let tasks_per_point = self.layout.tasks_per_point;
-        let axes = self.layout.axes.len();
-        let array = |(k, column): (usize, &DeclaredColumn)| match k.checked_sub(1) {
-            None => column.array(rows.iter().map(|(point, ..)| Some(point / tasks_per_point))),
-            Some(axis) if axis < axes => column.array(
+        let axis_count = self.layout.axes.len();
+        let column_array = |(k, column): (usize, &DeclaredColumn)| match k.checked_sub(1) {
+            None => column.to_array(rows.iter().map(|(point, ..)| Some(point / tasks_per_point))),
+            Some(axis) if axis < axis_count => column.to_array(
                 rows.iter().map(|(_, values, _)| values.get(axis).map(|value| value.to_bits())),
             ),
             Some(k) => {
-                let model_column = k - axes;
-                column.array(rows.iter().map(|(.., row)| row.get(model_column).copied().flatten()))
+                let model_column = k - axis_count;
+                column
+                    .to_array(rows.iter().map(|(.., row)| row.get(model_column).copied().flatten()))
             }
         };
-        let arrays =
-            self.layout.all_columns().enumerate().map(array).collect::<Result<Vec<_>, _>>()?;
+        let arrays = self
+            .layout
+            .all_columns()
+            .enumerate()
+            .map(column_array)
+            .collect::<Result<Vec<_>, _>>()?;
         self.rows.clear();
         RecordBatch::try_new(self.schema(), arrays)
     }

@@ -32,7 +32,7 @@ pub struct Shard {
 
 impl Shard {
     /// Returns whether a chunk belongs to this shard.
-    pub fn owns(self, chunk: u64) -> bool {
+    pub fn owns_chunk(self, chunk: u64) -> bool {
         chunk % self.count == self.index - 1
     }
 
@@ -58,10 +58,10 @@ impl FromStr for ShardRequest {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
+        let expected_text =
             || format!("expected I/N with I from 1 to N, or auto/N, such as 3/8; got `{text}`");
-        let (index, count) = text.split_once('/').ok_or_else(expected)?;
-        let count: u64 = count.parse().map_err(|_| expected())?;
+        let (index, count) = text.split_once('/').ok_or_else(expected_text)?;
+        let count: u64 = count.parse().map_err(|_| expected_text())?;
         if !(1..=MAX_SHARDS).contains(&count) {
             return Err(format!("expected 1 to {MAX_SHARDS} shards; got {count}"));
         }
@@ -70,7 +70,7 @@ impl FromStr for ShardRequest {
         }
         match index.parse() {
             Ok(index) if (1..=count).contains(&index) => Ok(Self::Given(Shard { index, count })),
-            _ => Err(expected()),
+            _ => Err(expected_text()),
         }
     }
 }
@@ -97,16 +97,20 @@ impl ShardLayout {
     }
 
     /// Returns the shards, numbered from 1, of which a chunk is missing.
-    pub(super) fn incomplete(self, chunks: u64, complete_chunks: &BTreeSet<u64>) -> Vec<u64> {
-        let mut chunks_done: BTreeMap<u64, u64> = BTreeMap::new();
+    pub(super) fn incomplete_shards(
+        self,
+        chunks: u64,
+        complete_chunks: &BTreeSet<u64>,
+    ) -> Vec<u64> {
+        let mut complete_by_shard: BTreeMap<u64, u64> = BTreeMap::new();
         for chunk in complete_chunks {
-            *chunks_done.entry(chunk % self.shards + 1).or_default() += 1;
+            *complete_by_shard.entry(chunk % self.shards + 1).or_default() += 1;
         }
-        let lacks_chunk = |index: &u64| {
+        let is_incomplete = |index: &u64| {
             let own_chunks = Shard { index: *index, count: self.shards }.count_chunks(chunks);
-            chunks_done.get(index).copied().unwrap_or(0) < own_chunks
+            complete_by_shard.get(index).copied().unwrap_or(0) < own_chunks
         };
-        (1..=self.shards).filter(lacks_chunk).collect()
+        (1..=self.shards).filter(is_incomplete).collect()
     }
 
     /// Writes the division, unless another shard has written one. Returns the division in the file.
@@ -139,10 +143,10 @@ pub(super) fn resolve_shard(
     stored_layout: Option<ShardLayout>,
 ) -> Result<Option<(Shard, ShardLayout)>, StoreError> {
     let refuse = |text: String| Err(StoreError::Refused(text));
-    let refuse_count = |shards: u64, requested: u64, help: String| {
+    let refuse_count = |shards: u64, requested_count: u64, help: String| {
         refuse(format!(
-            "this run was divided into {shards} shards by the first to start, not {requested}\n  \
-             = help: use --shard {help}"
+            "this run was divided into {shards} shards by the first to start, not \
+             {requested_count}\n  = help: use --shard {help}"
         ))
     };
     if let Some(ShardRequest::Given(shard)) = request {
@@ -155,10 +159,10 @@ pub(super) fn resolve_shard(
         }
         return Ok(Some((shard, layout)));
     }
-    let requested = request
+    let requested_count = request
         .map(|(ShardRequest::Auto { count } | ShardRequest::Given(Shard { count, .. }))| count);
-    let Some(scheduler) = Scheduler::read(environment)? else {
-        return match requested {
+    let Some(scheduler) = SchedulerTask::read(environment)? else {
+        return match requested_count {
             None => Ok(None),
             Some(count) => refuse(format!(
                 "--shard auto/{count} takes its number from SLURM_ARRAY_TASK_ID or \
@@ -166,9 +170,9 @@ pub(super) fn resolve_shard(
             )),
         };
     };
-    let layout = match (stored_layout, requested.or(scheduler.task_count)) {
+    let layout = match (stored_layout, requested_count.or(scheduler.task_count)) {
         (Some(ShardLayout { shards, .. }), Some(count))
-            if requested.is_some() && count != shards =>
+            if requested_count.is_some() && count != shards =>
         {
             return refuse_count(shards, count, format!("auto/{shards}"));
         }
@@ -199,7 +203,7 @@ pub(super) fn resolve_shard(
 }
 
 /// The environment variables of a scheduler about this task.
-struct Scheduler {
+struct SchedulerTask {
     /// The name of the variable with the task's number.
     variable: &'static str,
     /// The task's number in the array.
@@ -210,7 +214,7 @@ struct Scheduler {
     task_count: Option<u64>,
 }
 
-impl Scheduler {
+impl SchedulerTask {
     fn read(environment: Environment<'_>) -> Result<Option<Self>, StoreError> {
         let parse_variable = |name: &'static str| match environment(name) {
             None => Ok(None),
@@ -242,13 +246,12 @@ impl Scheduler {
 /// Formats numbers for `sbatch --array=`: `2,5-7`.
 pub fn format_numbers(numbers: impl IntoIterator<Item = u64>) -> String {
     let numbers: Vec<u64> = numbers.into_iter().collect();
-    let ranges = numbers.chunk_by(|parse_variable, next| parse_variable + 1 == *next).map(
-        |range| match range {
+    let formatted_ranges =
+        numbers.chunk_by(|previous, next| previous + 1 == *next).map(|range| match range {
             [first, .., last] => format!("{first}-{last}"),
             _ => range[0].to_string(),
-        },
-    );
-    ranges.collect::<Vec<_>>().join(",")
+        });
+    formatted_ranges.collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]
@@ -261,7 +264,7 @@ mod tests {
         move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
     }
 
-    fn refusal(result: Result<Option<(Shard, ShardLayout)>, StoreError>) -> String {
+    fn refusal_message(result: Result<Option<(Shard, ShardLayout)>, StoreError>) -> String {
         let error = result.unwrap_err();
         assert!(error.is_refusal());
         error.to_string()
@@ -284,7 +287,8 @@ mod tests {
     #[test]
     fn every_chunk_belongs_to_one_shard() {
         for chunk in 0..100 {
-            let owners = (1..=7).filter(|&index| Shard { index, count: 7 }.owns(chunk)).count();
+            let owners =
+                (1..=7).filter(|&index| Shard { index, count: 7 }.owns_chunk(chunk)).count();
             assert_eq!(owners, 1);
         }
         for chunks in 0..30 {
@@ -292,7 +296,7 @@ mod tests {
                 let shard = Shard { index, count: 7 };
                 assert_eq!(
                     shard.count_chunks(chunks),
-                    (0..chunks).filter(|&chunk| shard.owns(chunk)).count() as u64
+                    (0..chunks).filter(|&chunk| shard.owns_chunk(chunk)).count() as u64
                 );
             }
         }
@@ -335,7 +339,10 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "3"),
         ]);
-        assert!(refusal(resolve_shard(None, &array_with_gaps, None)).contains("numbered 0 to 2"));
+        assert!(
+            refusal_message(resolve_shard(None, &array_with_gaps, None))
+                .contains("numbered 0 to 2")
+        );
     }
 
     #[test]
@@ -345,12 +352,12 @@ mod tests {
             .unwrap()
             .unwrap();
         assert_eq!(shard, Shard { index: 1, count: 4 });
-        assert!(refusal(resolve_shard(None, &kubernetes, None)).contains("auto/N"));
+        assert!(refusal_message(resolve_shard(None, &kubernetes, None)).contains("auto/N"));
         let without_scheduler =
             resolve_shard(Some(ShardRequest::Auto { count: 4 }), &environment(&[]), None);
-        assert!(refusal(without_scheduler).contains("--shard I/4"));
+        assert!(refusal_message(without_scheduler).contains("--shard I/4"));
         let invalid_id = environment(&[("SLURM_ARRAY_TASK_ID", "x")]);
-        assert!(refusal(resolve_shard(None, &invalid_id, None)).contains("not a number"));
+        assert!(refusal_message(resolve_shard(None, &invalid_id, None)).contains("not a number"));
     }
 
     #[test]
@@ -358,12 +365,12 @@ mod tests {
         let stored_layout = Some(ShardLayout { shards: 4, first_array_id: 1 });
         let requested_shard = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
         assert!(
-            refusal(resolve_shard(requested_shard, &environment(&[]), stored_layout))
+            refusal_message(resolve_shard(requested_shard, &environment(&[]), stored_layout))
                 .contains("into 4 shards")
         );
         let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "1")]);
         assert!(
-            refusal(resolve_shard(
+            refusal_message(resolve_shard(
                 Some(ShardRequest::Auto { count: 8 }),
                 &kubernetes,
                 stored_layout
@@ -375,10 +382,10 @@ mod tests {
     #[test]
     fn a_shard_is_incomplete_until_all_its_chunks_exist() {
         let layout = ShardLayout { shards: 4, first_array_id: 1 };
-        assert_eq!(layout.incomplete(6, &BTreeSet::new()), [1, 2, 3, 4]);
-        assert_eq!(layout.incomplete(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
+        assert_eq!(layout.incomplete_shards(6, &BTreeSet::new()), [1, 2, 3, 4]);
+        assert_eq!(layout.incomplete_shards(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
         assert!(
-            layout.incomplete(2, &BTreeSet::from([0, 1])).is_empty(),
+            layout.incomplete_shards(2, &BTreeSet::from([0, 1])).is_empty(),
             "shards without a chunk lack nothing"
         );
     }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::open::{self, part_indices, read_part};
+use super::open::{self, list_part_indices, read_part};
 use super::plan_file::{PlanFile, StoredPlan};
 use super::point_parts::PointParts;
 use super::read::{NameCounts, count_failed};
 use super::shard::{self, ShardLayout};
-use super::{Folder, Holder, Job, StoreError, lock};
+use super::{Folder, Job, LockHolder, StoreError, lock};
 
 /// The stage of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -52,7 +52,7 @@ pub struct FolderStatus {
     /// The chunks whose part is damaged; the next run computes them again.
     pub chunks_damaged: Vec<u64>,
     /// The processes that work on the run.
-    pub running: Vec<Holder>,
+    pub running: Vec<LockHolder>,
     /// The number of shards, if the run is divided into shards.
     pub shards: Option<u64>,
     /// The incomplete shards on which no process works, in the scheduler's numbers: `2,5-7`, for
@@ -75,7 +75,7 @@ pub(super) fn serialize_path<S: Serializer>(path: &Path, serializer: S) -> Resul
 pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
     let folder = Folder::new(output, &job.layout)?;
     let parts = PointParts::new(job);
-    let chunks = parts.chunks();
+    let chunks = parts.chunk_count();
     let mut status = FolderStatus {
         output: output.to_path_buf(),
         points: job.points,
@@ -85,9 +85,11 @@ pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreEr
     };
     let job_plan = PlanFile::new(job);
     match PlanFile::read(&folder)? {
-        StoredPlan::Plan(found) => open::refuse_other_plan(&folder, &found, &job_plan)?,
+        StoredPlan::Plan(stored_plan) => open::refuse_other_plan(&folder, &stored_plan, &job_plan)?,
         StoredPlan::Nothing => {
-            let Some((_, tally)) = open::finished_result(&folder, job)? else { return Ok(status) };
+            let Some((_, tally)) = open::find_finished_result(&folder, job)? else {
+                return Ok(status);
+            };
             return Ok(FolderStatus {
                 state: RunStage::Finished,
                 points_done: tally.points,
@@ -101,12 +103,12 @@ pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreEr
         StoredPlan::Damaged => {}
     }
     let mut complete_chunks = BTreeSet::new();
-    for chunk in part_indices(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
-        let range = parts.range(chunk);
+    for chunk in list_part_indices(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
+        let range = parts.chunk_range(chunk);
         let mut by_status = NameCounts::new();
         let points = read_part(&parts, &folder, chunk, |part| {
-            part.add_statuses(&mut by_status)?;
-            Ok(part.points())
+            part.add_status_counts(&mut by_status)?;
+            Ok(part.point_count())
         });
         match points? {
             Ok(Some(points)) => {
@@ -133,7 +135,7 @@ pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreEr
         let is_running =
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
         let missing_shards = layout
-            .incomplete(chunks, &complete_chunks)
+            .incomplete_shards(chunks, &complete_chunks)
             .into_iter()
             .filter(|shard| !is_running(shard));
         status.missing_shard_numbers = missing_shards.collect();

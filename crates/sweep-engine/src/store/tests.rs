@@ -42,7 +42,7 @@ impl TestFolder {
 }
 
 fn default_options() -> OpenOptions<'static> {
-    OpenOptions { fresh: false, shard: None, environment: &|_| None }
+    OpenOptions { starts_over: false, shard: None, environment: &|_| None }
 }
 
 fn open_run(output: &Path, job: &Job<'_>) -> OpenRun {
@@ -68,7 +68,7 @@ fn part_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
 
 /// Writes all missing chunks, and returns their number.
 fn write_missing_chunks(run: &OpenRun) -> u64 {
-    (0..run.chunks())
+    (0..run.chunk_count())
         .filter(|&chunk| run.is_missing(chunk))
         .inspect(|&chunk| write_complete_chunk(run, chunk))
         .count() as u64
@@ -96,9 +96,8 @@ fn uninterrupted_result_bytes(points: u64) -> Vec<u8> {
 /// Returns the columns of a search's trials.
 fn trial_columns() -> TrialColumns {
     let axis_column = |name: &str| DeclaredColumn::new(name, "1", "a parameter", CellType::Axis);
-    let response_columns =
-        vec![DeclaredColumn::new("distance", "1", "an answer", CellType::Measured)];
-    TrialColumns { keys: ["x", "y"].map(axis_column).to_vec(), responses: response_columns }
+    let value_columns = vec![DeclaredColumn::new("distance", "1", "an answer", CellType::Measured)];
+    TrialColumns { key_columns: ["x", "y"].map(axis_column).to_vec(), value_columns }
 }
 
 /// Opens the trials of a search.

@@ -1,6 +1,6 @@
-//! The stored trials of a search. The next trials of a search follow from the responses so far.
-//! After an interruption the search therefore starts from its beginning, takes the responses of
-//! earlier trials from the store, and ends in the same bytes.
+//! The stored trials of a search. The next trials of a search follow from the values of those
+//! before. After an interruption the search therefore starts from its beginning, takes the values
+//! of earlier trials from the store, and ends in the same bytes.
 //!
 //! A search on `x.parquet` works in the folder `x.parquet.partial`, with the same lock and plan
 //! file as a run. Its points are not known beforehand, so its parts are only numbered: the last
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use super::open::{self, OpenOutcome};
-use super::part::{Damage, PartError, PartSchema};
+use super::part::{PartDamage, PartError, PartSchema};
 use super::{DeclaredColumn, Folder, Job, Lock, RowCells, StoreError, part_name};
 use sweep_files::{FileKind, atomic};
 
@@ -35,9 +35,9 @@ pub type TrialKey = Vec<u64>;
 #[derive(Clone, Debug)]
 pub struct TrialColumns {
     /// The columns that identify a trial.
-    pub keys: Vec<DeclaredColumn>,
-    /// The columns of a trial's response.
-    pub responses: Vec<DeclaredColumn>,
+    pub key_columns: Vec<DeclaredColumn>,
+    /// The columns of a trial's values.
+    pub value_columns: Vec<DeclaredColumn>,
 }
 
 /// The stored trials of a search whose folder this process has locked.
@@ -45,11 +45,11 @@ pub struct TrialColumns {
 pub struct Trials {
     folder: Folder,
     lock: Lock,
-    parts: PartSchema,
-    /// The responses of all trials.
-    responses: BTreeMap<TrialKey, RowCells>,
+    part_schema: PartSchema,
+    /// The values of all trials.
+    values_by_key: BTreeMap<TrialKey, RowCells>,
     /// The index of the last part.
-    last_part: u64,
+    last_part_index: u64,
     /// The rows of the last part.
     last_part_rows: Vec<RowCells>,
     /// Whether the last part has rows that are not written.
@@ -71,29 +71,29 @@ impl Trials {
     pub fn open(
         output: &Path,
         job: &Job<'_>,
-        columns: TrialColumns,
+        trial_columns: TrialColumns,
         fresh: bool,
     ) -> Result<OpenOutcome<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
         let find_finished = || match job.layout.kind {
             // A file of the model's parameters does not record the search that made it.
             FileKind::ModelFile => Ok(None),
-            _ => Ok(open::result_of_same_plan(&folder, job)?.map(drop)),
+            _ => Ok(open::open_result_of_same_plan(&folder, job)?.map(drop)),
         };
         let (lock, notes) =
             match open::claim_folder(&folder, job, fresh, || Ok(None), find_finished)? {
                 OpenOutcome::Finished(()) => return Ok(OpenOutcome::Finished(())),
                 OpenOutcome::Open(lock_and_notes) => lock_and_notes,
             };
-        let TrialColumns { keys: mut columns, responses } = columns;
+        let TrialColumns { key_columns: mut columns, value_columns } = trial_columns;
         let key_count = columns.len();
-        columns.extend(responses);
+        columns.extend(value_columns);
         let mut trials = Self {
             folder,
             lock,
-            parts: PartSchema::new(job, columns),
-            responses: BTreeMap::new(),
-            last_part: 0,
+            part_schema: PartSchema::new(job, columns),
+            values_by_key: BTreeMap::new(),
+            last_part_index: 0,
             last_part_rows: Vec::new(),
             is_dirty: false,
             last_write: Instant::now(),
@@ -105,15 +105,16 @@ impl Trials {
 
     /// Reads the parts, and renames damaged ones. The first `key_count` columns identify a trial.
     fn read(&mut self, key_count: usize) -> Result<(), StoreError> {
-        for index in open::part_indices(&self.folder)? {
-            match PartError::damage(read_rows(&self.parts, &self.folder, index))? {
+        for index in open::list_part_indices(&self.folder)? {
+            match PartError::separate_damage(read_rows(&self.part_schema, &self.folder, index))? {
                 Ok(rows) => {
                     for row in &rows {
-                        let (key, response) = row.split_at(key_count);
-                        let key = key.iter().map(|cell| cell.unwrap_or_default()).collect();
-                        self.responses.insert(key, response.to_vec());
+                        let (trial_key, values) = row.split_at(key_count);
+                        let trial_key =
+                            trial_key.iter().map(|cell| cell.unwrap_or_default()).collect();
+                        self.values_by_key.insert(trial_key, values.to_vec());
                     }
-                    self.last_part = index;
+                    self.last_part_index = index;
                     self.last_part_rows = rows;
                 }
                 Err(damage) => {
@@ -126,39 +127,39 @@ impl Trials {
     }
 
     /// Returns the number of stored trials.
-    pub fn count(&self) -> usize {
-        self.responses.len()
+    pub fn trial_count(&self) -> usize {
+        self.values_by_key.len()
     }
 
-    /// Returns the response of an earlier trial.
-    pub fn find_response(&self, key: &[u64]) -> Option<&RowCells> {
-        self.responses.get(key)
+    /// Returns the values of an earlier trial.
+    pub fn find_values(&self, key: &[u64]) -> Option<&RowCells> {
+        self.values_by_key.get(key)
     }
 
-    /// Adds a response, which the next [`Trials::write`] stores.
+    /// Adds a trial, which the next [`Trials::write`] stores.
     ///
     /// # Errors
     /// [`StoreError::File`], if the last part is full and has to be written.
-    pub fn add(&mut self, key: TrialKey, response: RowCells) -> Result<(), StoreError> {
+    pub fn add_trial(&mut self, key: TrialKey, values: RowCells) -> Result<(), StoreError> {
         if self.last_part_rows.len() >= PART_ROWS {
             self.write()?;
-            self.last_part += 1;
+            self.last_part_index += 1;
             self.last_part_rows.clear();
         }
         self.last_part_rows
-            .push(key.iter().copied().map(Some).chain(response.iter().copied()).collect());
-        self.responses.insert(key, response);
+            .push(key.iter().copied().map(Some).chain(values.iter().copied()).collect());
+        self.values_by_key.insert(key, values);
         self.is_dirty = true;
         Ok(())
     }
 
-    /// Returns whether there are responses to write and the last write is at least
+    /// Returns whether there are trials to write and the last write is at least
     /// [`WRITE_INTERVAL`] ago.
-    pub fn is_due(&self) -> bool {
+    pub fn is_write_due(&self) -> bool {
         self.is_dirty && self.last_write.elapsed() >= WRITE_INTERVAL
     }
 
-    /// Writes the responses that were added since the last write. When this returns, they survive a
+    /// Writes the trials that were added since the last write. When this returns, they survive a
     /// power cut.
     ///
     /// # Errors
@@ -167,8 +168,9 @@ impl Trials {
         if !self.is_dirty {
             return Ok(());
         }
-        let path = self.folder.file(part_name(self.last_part));
-        let bytes = self.parts.encode(&part_entry(self.last_part), &self.last_part_rows);
+        let path = self.folder.file(part_name(self.last_part_index));
+        let bytes =
+            self.part_schema.encode(&part_entry(self.last_part_index), &self.last_part_rows);
         let bytes = bytes.map_err(StoreError::parquet("write", &path))?;
         atomic::write(&self.folder.path, &path, &bytes)?;
         self.is_dirty = false;
@@ -196,10 +198,10 @@ fn part_entry(index: u64) -> String {
 fn read_rows(parts: &PartSchema, folder: &Folder, index: u64) -> Result<Vec<RowCells>, PartError> {
     let part = parts.open(&folder.file(part_name(index)), &part_entry(index))?;
     let Some(part) = part else { return Ok(Vec::new()) };
-    if part.rows() > PART_ROWS as u64 {
-        return Err(Damage::Rows.into());
+    if part.row_count() > PART_ROWS as u64 {
+        return Err(PartDamage::Rows.into());
     }
-    part.all_cells()
+    part.read_all_cells()
 }
 
 #[cfg(test)]

@@ -8,11 +8,11 @@ use arrow_array::types::UInt64Type;
 use serde::Serialize;
 
 use super::lock;
-use super::open::part_indices;
+use super::open::list_part_indices;
 use super::part;
 use super::plan_file::{PlanFile, StoredPlan};
-use super::point_parts::{is_part_of_run, number_column};
-use super::{Folder, Holder, StoreError, part_name};
+use super::point_parts::{is_part_of_run, row_number_column};
+use super::{Folder, LockHolder, StoreError, part_name};
 use sweep_files::ParquetFile;
 
 /// The progress of a run or a search that has no result yet.
@@ -32,7 +32,7 @@ pub struct UnfinishedWork {
     /// The number of stored points, or of stored trials of a search.
     pub points_done: u64,
     /// The processes that work on it.
-    pub running: Vec<Holder>,
+    pub running: Vec<LockHolder>,
 }
 
 /// Looks for the unfinished work on a result. `path` is that of the result or of the folder.
@@ -54,9 +54,10 @@ pub fn find_unfinished(path: &Path) -> Result<Option<UnfinishedWork>, StoreError
     let Ok(hash) = blake3::Hash::from_hex(&stored_plan.plan_hash) else { return Ok(None) };
     let mut points_done = 0;
     let mut is_search = false;
-    for index in part_indices(&folder)? {
+    for index in list_part_indices(&folder)? {
         // The run may have deleted its parts since they were listed.
-        let Some((part, entry)) = part::open_any(&folder.file(part_name(index)), &hash)? else {
+        let Some((part, entry)) = part::open_part_of_plan(&folder.file(part_name(index)), &hash)?
+        else {
             continue;
         };
         if is_part_of_run(&entry) {
@@ -79,9 +80,10 @@ pub fn find_unfinished(path: &Path) -> Result<Option<UnfinishedWork>, StoreError
 /// Counts the points of a part, whose rows are sorted by point.
 fn count_points(part: &ParquetFile) -> u64 {
     let fields = part.schema().fields();
-    let name = number_column(|name| fields.iter().any(|field| field.name() == name));
-    let position = fields.iter().position(|field| field.name() == name);
-    let batches = position.and_then(|position| part.batches(vec![position]).ok());
+    let column_name =
+        row_number_column(|column_name| fields.iter().any(|field| field.name() == column_name));
+    let column_index = fields.iter().position(|field| field.name() == column_name);
+    let batches = column_index.and_then(|column_index| part.batches(vec![column_index]).ok());
     let mut last_number = None;
     let mut count = 0;
     for batch in batches.into_iter().flatten().flatten() {

@@ -2,7 +2,7 @@
 
 use arrow_array::Float64Array;
 use sweep_engine::columns::point_rows;
-use sweep_engine::store::{CellType, ResultRows};
+use sweep_engine::store::{BatchBuilder, CellType};
 use washer_row::{Criterion, Status};
 
 use super::*;
@@ -69,13 +69,13 @@ fn metrics_have_columns_in_the_requested_order_and_criteria_describe_the_amplitu
     };
     let mut outcome = Outcome::new(0, model(&[1.5, 400.0]), model(&[0.5, 300.0]));
     outcome.static_sag_m = Some(0.013);
-    let mut rows = ResultRows::new(&layout);
-    rows.push(
+    let mut rows = BatchBuilder::new(&layout);
+    rows.push_row(
         0,
         vec![0.1, 60.0],
         point_rows(&columns(&measures).columns, 0, [&outcome]).rows.remove(0),
     );
-    let batch = rows.take().unwrap();
+    let batch = rows.take_batch().unwrap();
     assert_eq!(batch.num_columns(), plain + 5);
     let expected = [
         ("static_sag_m", 0.013),

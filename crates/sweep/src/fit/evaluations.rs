@@ -45,8 +45,8 @@ impl Evaluations {
             return Err(StoreError::Refused(format!("{path} is the result of another command")));
         };
         trials.take_notes().iter().for_each(|note| tell(note));
-        if trials.count() > 0 {
-            tell(&format!("going on: {} evaluations are there", trials.count()));
+        if trials.trial_count() > 0 {
+            tell(&format!("going on: {} evaluations are there", trials.trial_count()));
         }
         let unknowns = problem.unknowns();
         let signals = problem.signals().count();
@@ -63,7 +63,7 @@ impl Evaluations {
         compute: impl FnOnce() -> Result<Option<NormalEquations>, E>,
     ) -> Result<Option<NormalEquations>, E> {
         let key: TrialKey = x.iter().map(|x| x.to_bits()).collect();
-        if let Some(cells) = lock(&self.trials).find_response(&key) {
+        if let Some(cells) = lock(&self.trials).find_values(&key) {
             return Ok(self.read_equations(cells));
         }
         let start_time = Instant::now();
@@ -71,8 +71,8 @@ impl Evaluations {
         let is_costly = start_time.elapsed() >= IMMEDIATE_WRITE_TIME;
         let cells = self.to_cells(equations.as_ref());
         let mut trials = lock(&self.trials);
-        trials.add(key, cells)?;
-        if is_costly || trials.is_due() {
+        trials.add_trial(key, cells)?;
+        if is_costly || trials.is_write_due() {
             trials.write()?;
         }
         drop(trials);
@@ -154,7 +154,7 @@ fn evaluation_columns(problem: &Problem<'_>) -> TrialColumns {
     for row in unknowns {
         responses.push(number(format!("gradient_{row}"), "entry of J'Wr"));
     }
-    TrialColumns { keys, responses }
+    TrialColumns { key_columns: keys, value_columns: responses }
 }
 
 /// Returns the job of a problem: the plans of its cases, and a hash of the measurements.

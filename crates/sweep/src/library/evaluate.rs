@@ -16,7 +16,7 @@ use super::run::EvaluationTask;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use sweep_engine::engine::IncompleteGroups;
-use sweep_engine::store::{BATCH_ROWS, Layout, PointRows, ResultRows};
+use sweep_engine::store::{BATCH_ROWS, BatchBuilder, Layout, PointRows};
 use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::RefinementLevels;
@@ -148,13 +148,13 @@ impl<'a> BatchCollector<'a> {
     fn build_batch(&self, mut outcomes: Vec<PointRows>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
-        let mut rows = ResultRows::with_schema(layout, SchemaRef::clone(&self.schema));
+        let mut rows = BatchBuilder::with_schema(layout, SchemaRef::clone(&self.schema));
         for outcome in outcomes {
             for row in outcome.rows {
-                rows.push(outcome.point, (self.job.axis_values)(outcome.point), row);
+                rows.push_row(outcome.point, (self.job.axis_values)(outcome.point), row);
             }
         }
-        rows.take()
+        rows.take_batch()
     }
 
     /// Returns all batches in order, including incomplete ones.

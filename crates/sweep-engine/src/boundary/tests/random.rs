@@ -205,10 +205,11 @@ fn random_level_sets() {
     let seed = std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(clock_seed);
     let first_values: Vec<f64> =
         (0..ROW_COUNT).map(|k| f64::from(k) / f64::from(ROW_COUNT - 1)).collect();
-    let lattice_line_ranks = lattice_ranks(first_values.len(), SEARCH_RANGE.lattice);
+    let lattice_line_ranks = lattice_ranks(first_values.len(), SEARCH_RANGE.lattice_cells);
     let rows_per_cell =
         lattice_line_ranks.windows(2).map(|pair| pair[1] - pair[0] + 1).max().unwrap_or(1);
-    let cell_width = (SEARCH_RANGE.greatest - SEARCH_RANGE.least) / SEARCH_RANGE.lattice as f64;
+    let cell_width =
+        (SEARCH_RANGE.greatest - SEARCH_RANGE.least) / SEARCH_RANGE.lattice_cells as f64;
     let mut guaranteed_island_count = 0;
     let mut pocket_count = 0;
     let mut trial_count = 0;
@@ -219,9 +220,9 @@ fn random_level_sets() {
         let distance = |x, y| Some(level_set.distance(x, y));
         let traced_boundary = trace_and_check(distance, &first_values, &SEARCH_RANGE);
         check_side_changes(&traced_boundary, distance, SEARCH_RANGE.tolerance);
-        trial_count += traced_boundary.trials;
+        trial_count += traced_boundary.trial_count;
         let found_stretches: Vec<Vec<RowStretch>> =
-            traced_boundary.curves[0].iter().map(traced_stretches).collect();
+            traced_boundary.rows_by_curve[0].iter().map(traced_stretches).collect();
         let sides_by_row: Vec<Vec<bool>> =
             first_values.iter().map(|first| level_set.sample_sides(*first)).collect();
         for (first, islands) in common_stretches(&sides_by_row, rows_per_cell) {

@@ -13,14 +13,15 @@ pub(super) fn parse_clock_time(cell: &str) -> Option<f64> {
         None => (None, cell),
     };
     let days = date.map_or(Some(0.0), days_since_1970)?;
-    let mut parts = time.split(':');
-    let hours = parse_whole(parts.next()?, 24)?;
-    let minutes = parse_whole(parts.next()?, 59)?;
-    let seconds = parts.next().unwrap_or("0").replace(',', ".");
+    let mut time_fields = time.split(':');
+    let hours = parse_whole(time_fields.next()?, 24)?;
+    let minutes = parse_whole(time_fields.next()?, 59)?;
+    let seconds = time_fields.next().unwrap_or("0").replace(',', ".");
     let begins_with_digit = seconds.starts_with(|letter: char| letter.is_ascii_digit());
     let seconds: f64 = seconds.parse().ok()?;
-    let is_time = begins_with_digit && (0.0..61.0).contains(&seconds) && parts.next().is_none();
-    is_time.then_some(days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds)
+    let is_valid_time =
+        begins_with_digit && (0.0..61.0).contains(&seconds) && time_fields.next().is_none();
+    is_valid_time.then_some(days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds)
 }
 
 /// Returns the clock time of the seconds since 1970, with its date, or of the seconds since
@@ -28,29 +29,30 @@ pub(super) fn parse_clock_time(cell: &str) -> Option<f64> {
 /// seconds.
 pub(super) fn format_clock_time(seconds: f64) -> String {
     let milliseconds = (1e3 * seconds).round() as i64;
-    let format = match milliseconds.div_euclid(86_400_000) {
+    let time_format = match milliseconds.div_euclid(86_400_000) {
         0 => "%H:%M:%S%.3f",
         _ => "%Y-%m-%d %H:%M:%S%.3f",
     };
     DateTime::from_timestamp_millis(milliseconds)
-        .map_or_else(|| format!("{seconds} s"), |time| time.format(format).to_string())
+        .map_or_else(|| format!("{seconds} s"), |time| time.format(time_format).to_string())
 }
 
 /// Returns a whole number of at most four digits, if it is no greater than `max`.
 fn parse_whole(text: &str, max: u32) -> Option<f64> {
-    let is_plain = (1..=4).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
-    let number: u32 = text.parse().ok().filter(|_| is_plain)?;
+    let has_digits_only =
+        (1..=4).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
+    let number: u32 = text.parse().ok().filter(|_| has_digits_only)?;
     (number <= max).then_some(f64::from(number))
 }
 
 /// Returns the days since 1970 of a date: year, month, day with `-` or `/`, or day, month, year
 /// with points. A date that can be read in two ways gives `None`.
 fn days_since_1970(date: &str) -> Option<f64> {
-    let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
-    let [first, month, last] = parts.as_slice() else { return None };
-    let (year, day) = match (first.len(), last.len(), date.contains('.')) {
-        (4, _, false) => (first, last),
-        (_, 4, true) => (last, first),
+    let date_fields: Vec<&str> = date.split(['-', '/', '.']).collect();
+    let [first_field, month, last_field] = date_fields.as_slice() else { return None };
+    let (year, day) = match (first_field.len(), last_field.len(), date.contains('.')) {
+        (4, _, false) => (first_field, last_field),
+        (_, 4, true) => (last_field, first_field),
         _ => return None,
     };
     let [year, month, day] =

@@ -8,7 +8,7 @@ use super::super::source::{Located, Location, SourceId};
 use super::clock;
 use super::layout::{TableLayout, TextLine, data_lines, separator_words};
 use super::names::ColumnNames;
-use super::notation::{Evidence, Notation, NotationEvidence, UnclearNotation};
+use super::notation::{CellEvidence, Notation, NotationEvidence, UnclearNotation};
 use super::units::UnitScale;
 use super::{ID_COLUMN, ListColumn, ListError, TIME_COLUMN, check_size, is_index_column};
 
@@ -26,7 +26,8 @@ pub(super) struct TextTable {
 }
 
 /// Texts of cells without a value, in lower case.
-const MISSING_VALUES: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
+const MISSING_VALUE_TEXTS: [&str; 9] =
+    ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
 
 /// Reads a text; mistakes are reported.
 pub(super) fn read(
@@ -41,13 +42,13 @@ pub(super) fn read(
     };
     let separator = layout.separator;
     let headers = find_headers(&layout)?;
-    let width = headers.len();
+    let column_count = headers.len();
     let mut table =
         TextTable { separator, preamble_lines: layout.preamble_lines, ..TextTable::default() };
-    let mut scales: Vec<Option<UnitScale>> = Vec::new();
+    let mut unit_scales: Vec<Option<UnitScale>> = Vec::new();
     for (column_index, (header, location)) in headers.into_iter().enumerate() {
         let unit = layout.units.get(column_index).map(String::as_str);
-        let (column, scale) = create_column(
+        let (column, unit_scale) = create_column(
             header,
             column_index,
             unit,
@@ -56,7 +57,7 @@ pub(super) fn read(
             report,
         );
         table.columns.push(column);
-        scales.push(scale);
+        unit_scales.push(unit_scale);
     }
     let rows = data_lines(text, layout.rows_start);
     let notation = match layout.notation.map_or_else(|| detect_notation(rows.clone(), &table), Ok) {
@@ -68,33 +69,39 @@ pub(super) fn read(
     };
     for line in rows {
         let cells = line.cells(separator);
-        let count = cells.clone().count();
+        let cell_count = cells.clone().count();
         // Spreadsheets end rows with separators, and write rows that were emptied.
-        let is_padded = (2..=2 * width).contains(&count);
-        if is_padded && cells.clone().all(|(cell, _)| cell.is_empty()) {
+        let may_be_padded = (2..=2 * column_count).contains(&cell_count);
+        if may_be_padded && cells.clone().all(|(cell, _)| cell.is_empty()) {
             continue;
         }
-        let mut extra_cells = cells.clone().skip(width);
-        let has_empty_end = is_padded && extra_cells.all(|(cell, _)| cell.is_empty());
-        if count < width || !(count == width || has_empty_end || layout.is_labview) {
-            report.push_with(|_| wrong_row_length(line, count, width, separator, source));
+        let mut extra_cells = cells.clone().skip(column_count);
+        let has_empty_end = may_be_padded && extra_cells.all(|(cell, _)| cell.is_empty());
+        if cell_count < column_count
+            || !(cell_count == column_count || has_empty_end || layout.is_labview)
+        {
+            report.push_with(|_| {
+                row_length_mistake(line, cell_count, column_count, separator, source)
+            });
             continue;
         }
-        check_size(table.row_starts.len() as u64 + 1, width)?;
+        check_size(table.row_starts.len() as u64 + 1, column_count)?;
         // The cast loses nothing, because a list is smaller than 4 GiB.
         table.row_starts.push(line.start as u32);
-        for (((cell, location), column), scale) in cells.zip(&mut table.columns).zip(&scales) {
-            let Some(scale) = scale else { continue };
+        for (((cell, location), column), unit_scale) in
+            cells.zip(&mut table.columns).zip(&unit_scales)
+        {
+            let Some(unit_scale) = unit_scale else { continue };
             if allows_missing && is_missing(cell) {
                 column.values.push(f64::NAN);
                 continue;
             }
             let is_time = column.name.value == TIME_COLUMN;
-            let clock = || clock::parse_clock_time(cell).filter(|_| is_time);
-            if let Some(value) = notation.parse_number(cell).or_else(clock)
+            let parse_clock = || clock::parse_clock_time(cell).filter(|_| is_time);
+            if let Some(value) = notation.parse_number(cell).or_else(parse_clock)
                 && (allows_missing || !value.is_nan())
             {
-                column.values.push(scale.apply(value));
+                column.values.push(unit_scale.apply(value));
                 continue;
             }
             column.values.push(f64::NAN);
@@ -106,9 +113,9 @@ pub(super) fn read(
         }
     }
     let rows = table.row_starts.len();
-    for (column, scale) in table.columns.iter_mut().zip(&scales) {
+    for (column, unit_scale) in table.columns.iter_mut().zip(&unit_scales) {
         // A column of row identifiers has no numbers, so zeros fill it.
-        if scale.is_none() && column.name.value == ID_COLUMN {
+        if unit_scale.is_none() && column.name.value == ID_COLUMN {
             column.values = vec![0.0; rows];
         }
     }
@@ -147,7 +154,7 @@ fn create_column(
     names: &ColumnNames<'_>,
     report: &Report,
 ) -> (ListColumn, Option<UnitScale>) {
-    let named_column = |name: String, is_known| ListColumn {
+    let make_column = |name: String, is_known| ListColumn {
         name: Located { value: name, location: location.clone() },
         header: header.to_owned(),
         index,
@@ -156,39 +163,39 @@ fn create_column(
         is_clock: false,
     };
     if header == ID_COLUMN {
-        return (named_column(header.to_owned(), true), None);
+        return (make_column(header.to_owned(), true), None);
     }
     match names.find(header, unit) {
-        Ok(Some(found)) => (named_column(found.name, true), Some(found.scale)),
-        Ok(None) => (named_column(header.to_owned(), false), None),
+        Ok(Some(found)) => (make_column(found.name, true), Some(found.scale)),
+        Ok(None) => (make_column(header.to_owned(), false), None),
         Err([title, expected]) => {
             report.refuse::<()>(&location, title, expected);
-            (named_column(header.to_owned(), true), None)
+            (make_column(header.to_owned(), true), None)
         }
     }
 }
 
 /// Returns whether a cell marks a missing value.
 fn is_missing(cell: &str) -> bool {
-    cell.len() <= 4 && MISSING_VALUES.contains(&cell.to_lowercase().as_str())
+    cell.len() <= 4 && MISSING_VALUE_TEXTS.contains(&cell.to_lowercase().as_str())
 }
 
 /// Returns the mistake of a row with too few or too many cells.
-fn wrong_row_length(
+fn row_length_mistake(
     line: TextLine<'_>,
-    count: usize,
-    width: usize,
+    cell_count: usize,
+    column_count: usize,
     separator: char,
     source: SourceId,
 ) -> Diagnostic {
     let location = Location::new(source, line.offset..line.offset + line.text.len());
-    let [names, numbers] = ["name", "number"].map(|noun| format_count(width, noun));
-    let title = format!("a row of {} under {names}", format_count(count, "number"));
+    let [names, numbers] = ["name", "number"].map(|noun| format_count(column_count, noun));
+    let title = format!("a row of {} under {names}", format_count(cell_count, "number"));
     let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
     let mistake = Diagnostic::new(title).at_location(&location, expected);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
-    if separator == ',' && count > width { mistake.with_help(help) } else { mistake }
+    if separator == ',' && cell_count > column_count { mistake.with_help(help) } else { mistake }
 }
 
 /// Returns the notation of the numbers in these lines.
@@ -215,24 +222,24 @@ fn detect_notation<'t>(
 /// Returns the mistake of numbers that can be read in two ways.
 fn notation_mistake(unclear: &UnclearNotation, source: SourceId) -> Diagnostic {
     let evidence_location =
-        |evidence: &Evidence| Location::new(source, evidence.byte_range.clone());
+        |evidence: &CellEvidence| Location::new(source, evidence.byte_range.clone());
     match unclear {
-        UnclearNotation::TwoNotations(point, comma) => {
+        UnclearNotation::TwoNotations(point_cell, comma_cell) => {
             let title = format!(
                 "the file has decimal points, as in `{}`, and decimal commas, as in `{}`",
-                shorten(&point.cell),
-                shorten(&comma.cell)
+                shorten(&point_cell.cell),
+                shorten(&comma_cell.cell)
             );
             Diagnostic::new(title)
                 .at_location(
-                    &evidence_location(comma),
+                    &evidence_location(comma_cell),
                     "expected one decimal mark in the whole file",
                 )
-                .at_location(&evidence_location(point), "the other one")
+                .at_location(&evidence_location(point_cell), "the other one")
                 .with_help("write every number of the file with the same decimal mark")
         }
         UnclearNotation::OneCell(evidence) => {
-            let [thousands, decimals] = evidence.readings();
+            let [thousands, decimals] = evidence.possible_numbers();
             let title = format!("`{}` may be {thousands} or {decimals}", shorten(&evidence.cell));
             let help = format!(
                 "no other number of the file shows its decimal mark: write {thousands}, or \

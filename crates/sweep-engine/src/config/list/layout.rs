@@ -40,9 +40,10 @@ impl<'t> TextLine<'t> {
     pub(super) fn at(text: &'t str, start: usize) -> Self {
         let line = text.get(start..).unwrap_or_default();
         let line = line.split_inclusive('\n').next().unwrap_or_default();
-        let body = line.trim_end_matches(['\n', '\r']);
-        let plain = if start == 0 { body.trim_start_matches('\u{feff}') } else { body };
-        Self { start, text: plain, offset: start + body.len() - plain.len() }
+        let line_body = line.trim_end_matches(['\n', '\r']);
+        let line_text =
+            if start == 0 { line_body.trim_start_matches('\u{feff}') } else { line_body };
+        Self { start, text: line_text, offset: start + line_body.len() - line_text.len() }
     }
 
     /// Yields the cells of the line without white space and quotation marks, with their positions.
@@ -53,10 +54,10 @@ impl<'t> TextLine<'t> {
 
 /// Yields the lines of a text from a byte on, without empty lines and comments.
 pub(super) fn data_lines(text: &str, from: usize) -> impl Iterator<Item = TextLine<'_>> + Clone {
-    let mut next = from;
+    let mut next_start = from;
     let all_lines = text[from..].split_inclusive('\n').map(move |line| {
-        let start = next;
-        next += line.len();
+        let start = next_start;
+        next_start += line.len();
         TextLine::at(text, start)
     });
     all_lines.filter(|line| {
@@ -87,15 +88,17 @@ impl<'t> Iterator for LineCells<'t> {
                 return None;
             }
         }
-        let rest = &text[from..];
-        let end = end_of_cell(rest, self.separator);
-        self.next = (end < rest.len()).then_some(from + end + 1);
-        let cell = &rest[..end];
+        let rest_of_line = &text[from..];
+        let end = end_of_cell(rest_of_line, self.separator);
+        self.next = (end < rest_of_line.len()).then_some(from + end + 1);
+        let cell = &rest_of_line[..end];
         let start = self.line.offset + from + (cell.len() - cell.trim_start().len());
-        let trimmed = cell.trim();
-        let is_quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
-        let unquoted = if is_quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
-        Some((unquoted, start..start + trimmed.len()))
+        let trimmed_cell = cell.trim();
+        let is_quoted =
+            trimmed_cell.len() >= 2 && trimmed_cell.starts_with('"') && trimmed_cell.ends_with('"');
+        let unquoted =
+            if is_quoted { &trimmed_cell[1..trimmed_cell.len() - 1] } else { trimmed_cell };
+        Some((unquoted, start..start + trimmed_cell.len()))
     }
 }
 
@@ -155,16 +158,21 @@ impl<'t> TableLayout<'t> {
         let line_separator = |line: &TextLine<'_>| {
             stated_separator_char.unwrap_or_else(|| detect_separator(line.text))
         };
-        let words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
+        let count_words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
         // A single name may have several words, whereas cells that spaces separate are separated so
         // in every row.
         let separator_at = |k: usize| match line_separator(&first_lines[k]) {
-            WHITE_SPACE if first_lines.get(k + 1).map(words) != Some(words(&first_lines[k])) => ',',
+            WHITE_SPACE
+                if first_lines.get(k + 1).map(count_words)
+                    != Some(count_words(&first_lines[k])) =>
+            {
+                ','
+            }
             found => found,
         };
         // The best line has known names and stands above rows of numbers. If there is no such line,
         // a line with one of these properties is taken.
-        let rank = |k: usize| {
+        let rank_line = |k: usize| {
             let separator = separator_at(k);
             let Some(cells) = split_cells(first_lines[k], separator) else { return (0, false, 0) };
             let known_count = cells
@@ -174,25 +182,25 @@ impl<'t> TableLayout<'t> {
             (known_count.min(1), is_above_rows(&first_lines[k..], separator), known_count)
         };
         let mut header_index = 0;
-        let mut best_rank = rank(0);
+        let mut best_rank = rank_line(0);
         for k in 1..first_lines.len() {
             // Rows follow this line, and a line of names cannot come after rows.
             if best_rank.0 == 1 && best_rank.1 {
                 break;
             }
-            let next = rank(k);
-            if next > best_rank {
-                (header_index, best_rank) = (k, next);
+            let next_rank = rank_line(k);
+            if next_rank > best_rank {
+                (header_index, best_rank) = (k, next_rank);
             }
         }
         let header = first_lines.get(header_index).copied().unwrap_or(first_line);
-        if let Some(commented) = find_commented_header(text, header, &line_separator) {
-            return Ok(Some(commented));
+        if let Some(commented_layout) = find_commented_header(text, header, &line_separator) {
+            return Ok(Some(commented_layout));
         }
         let separator = separator_at(header_index);
         let next_line = first_lines.get(header_index + 1);
-        let count = split_cells(header, separator).map_or(0, |names| names.len());
-        let units = next_line.and_then(|line| parse_units(*line, separator, count));
+        let column_count = split_cells(header, separator).map_or(0, |names| names.len());
+        let units = next_line.and_then(|line| parse_units(*line, separator, column_count));
         let last_header_line =
             if units.is_some() { next_line.copied().unwrap_or(header) } else { header };
         Ok(Some(Self {
@@ -211,25 +219,25 @@ impl<'t> TableLayout<'t> {
         /// The text of the line that ends a header.
         const HEADER_END: &str = "***End_of_Header***";
         let is_header_end = |line: &TextLine<'_>| line.text.starts_with(HEADER_END);
-        let value = |key: &str| {
+        let header_value = |key: &str| {
             let key_value = first_lines.iter().find_map(|line| line.text.strip_prefix(key));
             key_value.map(|key_value| key_value.trim_matches([',', '\t', ';']).to_owned())
         };
-        let separator = match value("Separator").as_deref() {
+        let separator = match header_value("Separator").as_deref() {
             Some("Comma") => ',',
             _ => '\t',
         };
-        let notation = match value("Decimal_Separator").as_deref() {
+        let notation = match header_value("Decimal_Separator").as_deref() {
             // If commas separate cells, a comma at the end of the line is the value itself.
             Some(",") => Notation::COMMA,
             Some("") if separator == '\t' => Notation::COMMA,
             _ => Notation::POINT,
         };
-        let layout = value("X_Columns").unwrap_or_default();
-        if layout != "One" && !layout.is_empty() {
+        let x_columns = header_value("X_Columns").unwrap_or_default();
+        if x_columns != "One" && !x_columns.is_empty() {
             return Err(format!(
-                "it is a LabVIEW file with X_Columns {layout}: write it again with one column of \
-                 times"
+                "it is a LabVIEW file with X_Columns {x_columns}: write it again with one column \
+                 of times"
             ));
         }
         /// The message about a file of several segments.
@@ -238,16 +246,16 @@ impl<'t> TableLayout<'t> {
         let header_end_lines: Vec<usize> =
             (0..first_lines.len()).filter(|k| is_header_end(&first_lines[*k])).collect();
         // A file has two headers: its own and that of its segment.
-        let end = match header_end_lines.as_slice() {
+        let header_end = match header_end_lines.as_slice() {
             [] => return Err("it is a LabVIEW file whose header has no end".to_owned()),
-            [end] | [_, end] => *end,
+            [header_end] | [_, header_end] => *header_end,
             _ => return Err(SEVERAL_SEGMENTS.to_owned()),
         };
-        let Some(header) = first_lines.get(end + 1).copied() else {
+        let Some(header) = first_lines.get(header_end + 1).copied() else {
             return Err("it is a LabVIEW file without signals".to_owned());
         };
-        let rows = end_of_line(text, header);
-        if text[rows..].contains(HEADER_END) {
+        let rows_start = end_of_line(text, header);
+        if text[rows_start..].contains(HEADER_END) {
             return Err(SEVERAL_SEGMENTS.to_owned());
         }
         let mut units = vec!["s".to_owned()];
@@ -259,9 +267,9 @@ impl<'t> TableLayout<'t> {
             header,
             units,
             notation: Some(notation),
-            rows_start: rows,
+            rows_start,
             is_labview: true,
-            preamble_lines: end + 1,
+            preamble_lines: header_end + 1,
         })
     }
 }
@@ -276,13 +284,13 @@ fn find_commented_header<'t>(
     let preceding_text = text[..row.start].trim_end();
     let start = preceding_text.rfind('\n').map_or(0, |end| end + 1);
     let line = TextLine::at(text, start);
-    let names = line.text.trim_start().strip_prefix('#')?;
-    let offset = line.offset + line.text.len() - names.len();
-    let header = TextLine { start, text: names, offset };
+    let name_text = line.text.trim_start().strip_prefix('#')?;
+    let offset = line.offset + line.text.len() - name_text.len();
+    let header = TextLine { start, text: name_text, offset };
     let separator = separator(&header);
-    let count = split_cells(header, separator)?.len();
-    let numbers = split_cells(row, separator)?;
-    let is_row = numbers.len() == count && numbers.into_iter().all(is_number);
+    let column_count = split_cells(header, separator)?.len();
+    let row_cells = split_cells(row, separator)?;
+    let is_row = row_cells.len() == column_count && row_cells.into_iter().all(is_number);
     is_row.then_some(TableLayout {
         separator,
         header,
@@ -309,24 +317,24 @@ fn end_of_line(text: &str, line: TextLine<'_>) -> usize {
 
 /// Returns the separator that a first line `sep=;` states, a convention of Excel.
 fn stated_separator(line: &str) -> Option<char> {
-    let stated = line.trim().trim_matches('"').strip_prefix("sep=")?;
-    let mut letters = stated.chars();
+    let stated_text = line.trim().trim_matches('"').strip_prefix("sep=")?;
+    let mut letters = stated_text.chars();
     let separator = letters.next().unwrap_or('\t');
     letters.next().is_none().then_some(separator)
 }
 
 /// Returns the separator of a line of names.
 fn detect_separator(line: &str) -> char {
-    let occurs = |wanted: &char| {
+    let occurs_unquoted = |wanted: &char| {
         let mut is_quoted = false;
         line.chars().any(|letter| {
             is_quoted ^= letter == '"';
             letter == *wanted && !is_quoted
         })
     };
-    let occurring_separator = [';', '\t', ','].into_iter().find(occurs);
-    let has_words = line.split_whitespace().nth(1).is_some() && !line.contains('"');
-    occurring_separator.unwrap_or(if has_words { WHITE_SPACE } else { ',' })
+    let first_separator = [';', '\t', ','].into_iter().find(occurs_unquoted);
+    let has_several_words = line.split_whitespace().nth(1).is_some() && !line.contains('"');
+    first_separator.unwrap_or(if has_several_words { WHITE_SPACE } else { ',' })
 }
 
 /// Returns whether a cell is a number in any notation.
@@ -340,11 +348,12 @@ fn is_number(cell: &str) -> bool {
 /// Returns whether the first of these lines has as many names as the next row has numbers.
 fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
     let [header, following_lines @ ..] = lines else { return false };
-    let Some(names) = split_cells(*header, separator) else { return false };
-    if names.iter().any(|name| is_number(name)) {
+    let Some(header_cells) = split_cells(*header, separator) else { return false };
+    if header_cells.iter().any(|name| is_number(name)) {
         return false;
     }
-    let has_units = |line: &&TextLine<'_>| parse_units(**line, separator, names.len()).is_some();
+    let has_units =
+        |line: &&TextLine<'_>| parse_units(**line, separator, header_cells.len()).is_some();
     let following_lines = if following_lines.first().as_ref().is_some_and(has_units) {
         &following_lines[1..]
     } else {
@@ -352,9 +361,10 @@ fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
     };
     let Some(row) = following_lines.first() else { return false };
     let Some(row) = split_cells(*row, separator) else { return false };
-    let names = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
-    row.len() >= names
-        && row[names..].iter().all(|cell| cell.is_empty())
+    let header_cells =
+        header_cells.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
+    row.len() >= header_cells
+        && row[header_cells..].iter().all(|cell| cell.is_empty())
         && row.iter().any(|cell| is_number(cell))
 }
 
@@ -365,13 +375,13 @@ fn parse_units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Ve
     let cells: Vec<String> =
         split_cells(line, separator)?.into_iter().map(strip_brackets).collect();
     let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
-    let is_row = cells.len() == columns
+    let is_row_of_units = cells.len() == columns
         && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))
         && cells.iter().any(|cell| is_unit_name(cell));
     let known_count = cells.iter().filter(|cell| is_empty(cell) || is_unit_name(cell)).count();
     // Units of ignored columns may be unknown, such as volts or degrees Celsius.
-    let is_row = is_row && 2 * known_count > cells.len();
-    is_row.then(|| {
+    let is_row_of_units = is_row_of_units && 2 * known_count > cells.len();
+    is_row_of_units.then(|| {
         cells.into_iter().map(|cell| if is_empty(&cell) { String::new() } else { cell }).collect()
     })
 }

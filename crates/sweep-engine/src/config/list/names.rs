@@ -40,13 +40,13 @@ impl ColumnNames<'_> {
         header: &str,
         unit: Option<&str>,
     ) -> Result<Option<KnownName>, UnitContradiction> {
-        let (stem, bracketed) = split_bracketed(header);
-        let unit = bracketed.or(unit).filter(|unit| !unit.is_empty());
-        let is_renamed = |(header_text, _): &&(String, String)| {
+        let (stem, bracketed_unit) = split_bracketed(header);
+        let unit = bracketed_unit.or(unit).filter(|unit| !unit.is_empty());
+        let is_renamed_header = |(header_text, _): &&(String, String)| {
             let header_text = header_text.trim();
             header_text == header || header_text == stem
         };
-        if let Some((_, name)) = self.renamed.iter().find(is_renamed) {
+        if let Some((_, name)) = self.renamed.iter().find(is_renamed_header) {
             let Some((name, unit_of_name)) = (self.known)(name) else {
                 let title =
                     format!("the column `{}` is called `{}`", shorten(header), shorten(name));
@@ -54,11 +54,12 @@ impl ColumnNames<'_> {
             };
             return match_with_scale(header, name, unit, &unit_of_name).map(Some);
         }
-        let stem = normalise(stem);
+        let stem = normalise_header(stem);
         let exact_match = (self.known)(header).or_else(|| (self.known)(&stem));
         let find_by_unit = || {
-            let names = unit_suffixes(unit?).into_iter().map(|suffix| format!("{stem}_{suffix}"));
-            names.filter_map(|name| (self.known)(&name)).next()
+            let candidate_names =
+                unit_suffixes(unit?).into_iter().map(|suffix| format!("{stem}_{suffix}"));
+            candidate_names.filter_map(|name| (self.known)(&name)).next()
         };
         if let Some((name, unit_of_name)) = exact_match {
             let match_result = match_with_scale(header, name, unit, &unit_of_name);
@@ -90,9 +91,10 @@ impl ColumnNames<'_> {
             && let Some((stem, suffix)) = split_unit_suffix(&stem)
         {
             let written_unit = unit_from_suffix(suffix);
-            let names =
+            let candidate_names =
                 unit_suffixes(&written_unit).into_iter().map(|suffix| format!("{stem}_{suffix}"));
-            if let Some((name, unit_of_name)) = names.filter_map(|name| (self.known)(&name)).next()
+            if let Some((name, unit_of_name)) =
+                candidate_names.filter_map(|name| (self.known)(&name)).next()
             {
                 return match_with_scale(header, name, Some(&written_unit), &unit_of_name)
                     .map(Some);
@@ -126,9 +128,9 @@ fn match_with_scale(
                 shorten(header),
                 shorten(unit)
             );
-            let kind =
+            let expected_kind =
                 if is_unit_name(unit) { "a unit of the same kind as" } else { "a known unit, as" };
-            Err([title, format!("expected {kind} {unit_of_name}, the unit of `{name}`")])
+            Err([title, format!("expected {expected_kind} {unit_of_name}, the unit of `{name}`")])
         }
     }
 }
@@ -136,16 +138,16 @@ fn match_with_scale(
 /// Splits a header into its stem and the unit in brackets at its end.
 fn split_bracketed(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
-    let pairs = [('[', ']'), ('(', ')')];
-    let split_bracketed = pairs.into_iter().find_map(|(open, close)| {
+    let bracket_pairs = [('[', ']'), ('(', ')')];
+    let stem_and_unit = bracket_pairs.into_iter().find_map(|(open, close)| {
         let (stem, unit) = header.strip_suffix(close)?.rsplit_once(open)?;
         (!stem.trim().is_empty()).then_some((stem.trim(), Some(unit.trim())))
     });
-    split_bracketed.unwrap_or((header, None))
+    stem_and_unit.unwrap_or((header, None))
 }
 
 /// Returns a text in the form of names: lower case, words joined by underscores.
-fn normalise(text: &str) -> String {
+fn normalise_header(text: &str) -> String {
     let words = text.split(|letter: char| letter.is_whitespace() || letter == '-');
     let words: Vec<String> = words.filter(|word| !word.is_empty()).map(str::to_lowercase).collect();
     words.join("_")
@@ -153,15 +155,16 @@ fn normalise(text: &str) -> String {
 
 /// Splits a name into its stem and the unit at its end.
 fn split_unit_suffix(name: &str) -> Option<(&str, &str)> {
-    let splits = name.match_indices('_').map(|(index, _)| (&name[..index], &name[index + 1..]));
-    splits.into_iter().find(|(_, suffix)| is_unit_name(&unit_from_suffix(suffix)))
+    let underscore_splits =
+        name.match_indices('_').map(|(index, _)| (&name[..index], &name[index + 1..]));
+    underscore_splits.into_iter().find(|(_, suffix)| is_unit_name(&unit_from_suffix(suffix)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const KNOWN: [(&str, &str); 6] = [
+    const KNOWN_QUANTITIES: [(&str, &str); 6] = [
         ("time_s", "s"),
         ("speed_rpm", "rpm"),
         ("arm_end_y", "m"),
@@ -172,12 +175,12 @@ mod tests {
 
     fn find(header: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, UnitContradiction> {
         let known = |name: &str| {
-            let found = KNOWN.iter().find(|(known, _)| *known == name);
+            let found = KNOWN_QUANTITIES.iter().find(|(known, _)| *known == name);
             found.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
         };
         let renamed = [("Acc front".to_owned(), "arm_end_y_m_per_s2".to_owned())];
-        let names = ColumnNames { known: &known, renamed: &renamed };
-        let found = names.find(header, unit)?;
+        let candidate_names = ColumnNames { known: &known, renamed: &renamed };
+        let found = candidate_names.find(header, unit)?;
         Ok(found.map(|found| (found.name, found.scale.apply(1.0))))
     }
 

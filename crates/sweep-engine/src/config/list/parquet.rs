@@ -38,11 +38,12 @@ pub(super) fn read_columns(
     allows_missing: bool,
     names: &ColumnNames<'_>,
 ) -> Result<Vec<ParquetColumn>, ListError> {
-    let panic_error = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
-    panics::catch_panic(|| read(bytes.into(), allows_missing, names)).unwrap_or_else(panic_error)
+    let damage_by_panic = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
+    panics::catch_panic(|| read_columns_unguarded(bytes.into(), allows_missing, names))
+        .unwrap_or_else(damage_by_panic)
 }
 
-fn read(
+fn read_columns_unguarded(
     bytes: Bytes,
     allows_missing: bool,
     names: &ColumnNames<'_>,
@@ -74,12 +75,12 @@ fn read(
         }
     }
     check_row_groups(&metadata, fields.len())?;
-    let mut rows = 0;
+    let mut row_count = 0;
     let fields = known_columns.iter().map(|(_, column_index, _)| *column_index).collect();
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
     let mut reader = reader.map_err(damage_error)?;
     while let Some(batch) = reader.read_batch().map_err(damage_error)? {
-        check_size((rows + batch.num_rows()) as u64, known_columns.len())?;
+        check_size((row_count + batch.num_rows()) as u64, known_columns.len())?;
         for ((column, _, scale), array) in known_columns.iter().zip(batch.columns()) {
             let ParquetColumn { header, values: Some(values), is_clock, .. } =
                 &mut columns[*column]
@@ -90,35 +91,36 @@ fn read(
                 if *is_clock { cells::clock_seconds(array) } else { cells::numbers(array) };
             let numbers = numbers.map_err(|error| error.to_string())?;
             for (k, value) in numbers.into_iter().enumerate() {
-                let row = rows + k + 1;
-                let no_value =
+                let row = row_count + k + 1;
+                let null_error =
                     || format!("its column `{}` has no value in row {row}", shorten(header));
                 let value = if allows_missing { value.or(Some(f64::NAN)) } else { value };
-                values.push(scale.apply(value.ok_or_else(no_value)?));
+                values.push(scale.apply(value.ok_or_else(null_error)?));
             }
         }
-        rows += batch.num_rows();
+        row_count += batch.num_rows();
     }
     Ok(columns)
 }
 
 /// Returns the mistake of a column without numbers.
 fn no_numbers_error(header: &str, data_type: &DataType) -> ListError {
-    let type_name = match data_type {
+    let cell_kind = match data_type {
         DataType::Boolean => "true and false",
         text if cells::is_text(text) => "text",
         _ => "dates, times, lists or bytes",
     };
-    format!("its column `{}` holds no numbers but {type_name}", shorten(header))
+    format!("its column `{}` holds no numbers but {cell_kind}", shorten(header))
 }
 
 /// Rejects a file of too many rows, or of an unknown compression, before its pages are read.
 fn check_row_groups(metadata: &ParquetMetaData, columns: usize) -> Result<(), ListError> {
-    let mut rows = 0_u64;
-    for group in metadata.row_groups() {
-        rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
-        check_size(rows, columns)?;
-        for column in group.columns() {
+    let mut row_count = 0_u64;
+    for row_group in metadata.row_groups() {
+        row_count =
+            row_count.saturating_add(u64::try_from(row_group.num_rows()).unwrap_or(u64::MAX));
+        check_size(row_count, columns)?;
+        for column in row_group.columns() {
             let codec = column.compression();
             // The parquet library has these codecs only with features that the workspace's
             // Cargo.toml leaves out.

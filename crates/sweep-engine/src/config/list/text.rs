@@ -23,16 +23,16 @@ const UTF16_DETECTION_BYTES: usize = 512;
 /// # Errors
 /// The kind of the file, if it is no text.
 pub(super) fn decode_text(bytes: Vec<u8>) -> Result<String, ListError> {
-    if let Some((_, kind)) =
+    if let Some((_, kind_and_advice)) =
         BINARY_KINDS.iter().find(|(magic_bytes, _)| bytes.starts_with(magic_bytes))
     {
-        return Err((*kind).to_owned());
+        return Err((*kind_and_advice).to_owned());
     }
     let text = match utf16_decoder(&bytes) {
         Some(decode) => {
-            let units = bytes.chunks_exact(2).map(|pair| decode([pair[0], pair[1]]));
-            let units: Vec<u16> = units.collect();
-            String::from_utf16(&units).map_err(|_| "it is damaged UTF-16 text".to_owned())?
+            let code_units = bytes.chunks_exact(2).map(|pair| decode([pair[0], pair[1]]));
+            let code_units: Vec<u16> = code_units.collect();
+            String::from_utf16(&code_units).map_err(|_| "it is damaged UTF-16 text".to_owned())?
         }
         None => decode_bytes(bytes)?,
     };
@@ -50,12 +50,12 @@ fn utf16_decoder(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
         _ => {}
     }
     let first_bytes = &bytes[..bytes.len().min(UTF16_DETECTION_BYTES)];
-    let zeros =
+    let count_zeros =
         |parity: usize| first_bytes.iter().skip(parity).step_by(2).filter(|b| **b == 0).count();
-    let pairs = first_bytes.len() / 2;
-    match [zeros(0), zeros(1)] {
-        [0, odd] if pairs > 0 && odd * 10 > pairs * 9 => Some(u16::from_le_bytes),
-        [even, 0] if pairs > 0 && even * 10 > pairs * 9 => Some(u16::from_be_bytes),
+    let pair_count = first_bytes.len() / 2;
+    match [count_zeros(0), count_zeros(1)] {
+        [0, odd] if pair_count > 0 && odd * 10 > pair_count * 9 => Some(u16::from_le_bytes),
+        [even, 0] if pair_count > 0 && even * 10 > pair_count * 9 => Some(u16::from_be_bytes),
         _ => None,
     }
 }
@@ -77,15 +77,18 @@ fn decode_bytes(bytes: Vec<u8>) -> Result<String, ListError> {
 /// its control characters.
 fn cp1252_letter(byte: u8) -> char {
     /// The first byte whose letter differs from Latin-1.
-    const FIRST: u8 = 0x80;
+    const FIRST_DIFFERENT_BYTE: u8 = 0x80;
     /// The letters from that byte on.
-    const LETTERS: [char; 32] = [
+    const LETTERS_FROM_FIRST: [char; 32] = [
         '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž',
         '\u{8f}', '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}',
         'ž', 'Ÿ',
     ];
-    let byte_index = byte.checked_sub(FIRST).map(usize::from);
-    byte_index.and_then(|byte_index| LETTERS.get(byte_index)).copied().unwrap_or(char::from(byte))
+    let byte_index = byte.checked_sub(FIRST_DIFFERENT_BYTE).map(usize::from);
+    byte_index
+        .and_then(|byte_index| LETTERS_FROM_FIRST.get(byte_index))
+        .copied()
+        .unwrap_or(char::from(byte))
 }
 
 #[cfg(test)]
@@ -94,32 +97,32 @@ mod tests {
 
     #[test]
     fn text_encodings_are_detected() {
-        let expected = "Weg [µm]\n1\n";
-        let wide = |order: fn(u16) -> [u8; 2], mark: &str| -> Vec<u8> {
-            let text = format!("{mark}{expected}");
+        let expected_text = "Weg [µm]\n1\n";
+        let encode_utf16 = |order: fn(u16) -> [u8; 2], mark: &str| -> Vec<u8> {
+            let text = format!("{mark}{expected_text}");
             text.encode_utf16().flat_map(order).collect()
         };
         for bytes in [
-            expected.as_bytes().to_vec(),
+            expected_text.as_bytes().to_vec(),
             b"Weg [\xb5m]\n1\n".to_vec(),
             b"Weg [\xb5m]\r1\r".to_vec(),
-            wide(u16::to_le_bytes, "\u{feff}"),
-            wide(u16::to_be_bytes, "\u{feff}"),
-            wide(u16::to_le_bytes, ""),
-            wide(u16::to_be_bytes, ""),
+            encode_utf16(u16::to_le_bytes, "\u{feff}"),
+            encode_utf16(u16::to_be_bytes, "\u{feff}"),
+            encode_utf16(u16::to_le_bytes, ""),
+            encode_utf16(u16::to_be_bytes, ""),
         ] {
-            let decoded = decode_text(bytes).unwrap();
-            assert_eq!(decoded.trim_start_matches('\u{feff}'), expected);
+            let decoded_text = decode_text(bytes).unwrap();
+            assert_eq!(decoded_text.trim_start_matches('\u{feff}'), expected_text);
         }
         assert_eq!(decode_text(b"\x80 \x93".to_vec()).unwrap(), "€ “");
     }
 
     #[test]
     fn other_kinds_of_files_are_named() {
-        let message = |bytes: &[u8]| decode_text(bytes.to_vec()).unwrap_err();
-        assert!(message(b"PK\x03\x04rest").contains("save its sheet as CSV"));
-        assert!(message(b"MATLAB 5.0 MAT-file").contains("writetable"));
-        assert!(message(b"a,b\n\xff\x01").contains("byte 6 is wrong"));
-        assert!(message(b"\xff\xfe\x00\xd8").contains("damaged UTF-16"));
+        let decode_error = |bytes: &[u8]| decode_text(bytes.to_vec()).unwrap_err();
+        assert!(decode_error(b"PK\x03\x04rest").contains("save its sheet as CSV"));
+        assert!(decode_error(b"MATLAB 5.0 MAT-file").contains("writetable"));
+        assert!(decode_error(b"a,b\n\xff\x01").contains("byte 6 is wrong"));
+        assert!(decode_error(b"\xff\xfe\x00\xd8").contains("damaged UTF-16"));
     }
 }

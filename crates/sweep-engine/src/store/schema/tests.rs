@@ -15,9 +15,9 @@ fn every_field_carries_unit_and_description() {
 #[test]
 fn name_dictionaries_do_not_depend_on_which_names_appear() {
     let layout = synthetic::layout();
-    let mut rows = ResultRows::new(&layout);
-    rows.push(0, vec![0.1, 60.0], synthetic::row(0));
-    let batch = rows.take().unwrap();
+    let mut rows = BatchBuilder::new(&layout);
+    rows.push_row(0, vec![0.1, 60.0], synthetic::row(0));
+    let batch = rows.take_batch().unwrap();
     let names = |column: &str| {
         let array = batch.column_by_name(column).unwrap();
         let array = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>().unwrap();

@@ -30,7 +30,7 @@ fn starting_over_deletes_only_files_that_a_run_wrote() {
 
 /// Returns the options of a run that starts over.
 fn fresh_options() -> OpenOptions<'static> {
-    OpenOptions { fresh: true, ..default_options() }
+    OpenOptions { starts_over: true, ..default_options() }
 }
 
 /// Returns the names of the files in the folder, sorted.
@@ -70,7 +70,7 @@ fn foreign_files_are_kept_under_any_name() {
             for name in RUN_LIKE_FILE_NAMES {
                 fs::write(test_folder.partial_folder().join(name), foreign_text).unwrap();
             }
-            let options = OpenOptions { fresh: is_fresh, ..default_options() };
+            let options = OpenOptions { starts_over: is_fresh, ..default_options() };
             let OpenOutcome::Open(run) =
                 OpenRun::open(&test_folder.result_path(), &job, options).unwrap()
             else {
@@ -179,7 +179,7 @@ fn a_foreign_file_at_the_output_is_not_overwritten() {
         let error = OpenRun::open(
             &test_folder.result_path(),
             &job,
-            OpenOptions { fresh, ..default_options() },
+            OpenOptions { starts_over: fresh, ..default_options() },
         )
         .unwrap_err();
         assert!(error.is_refusal());

@@ -1,6 +1,6 @@
 //! Tests of parts: interrupted runs, damaged parts, shards, and counts.
 
-use super::super::part::Damage;
+use super::super::part::PartDamage;
 use super::super::point_parts::{PointPart, PointParts};
 use super::*;
 
@@ -168,7 +168,7 @@ fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
             .contains("into 4 shards")
     );
     let fresh_shard_options = OpenOptions {
-        fresh: true,
+        starts_over: true,
         shard: Some(ShardRequest::Given(Shard { index: 2, count: 4 })),
         ..default_options()
     };
@@ -247,7 +247,7 @@ fn an_incomplete_chunk_is_resumed() {
 
     let run = open_run(&test_folder.result_path(), &job);
     assert_eq!(run.count_own_points(), (POINT_COUNT, 11));
-    let incomplete_chunks = run.take_incomplete();
+    let incomplete_chunks = run.take_incomplete_chunks();
     assert_eq!(
         incomplete_chunks.into_iter().collect::<Vec<_>>(),
         [(3, synthetic_rows([25, 27, 30].into_iter()))]
@@ -307,7 +307,7 @@ fn an_unfinished_search_shows_the_number_of_trials() {
     let job = synthetic::job(POINT_COUNT);
     let mut trials = open_trials(&test_folder.result_path(), &job);
     for k in 0..5 {
-        trials.add(vec![k, 0], vec![Some(1)]).unwrap();
+        trials.add_trial(vec![k, 0], vec![Some(1)]).unwrap();
     }
     trials.write().unwrap();
     let unfinished_work = find_unfinished(&test_folder.result_path()).unwrap().unwrap();
@@ -330,7 +330,7 @@ fn a_damaged_part_is_renamed_and_a_new_one_replaces_it() {
     write_complete_chunk(&open_run(&test_folder.result_path(), &job), 1);
 
     let mut run = open_run(&test_folder.result_path(), &job);
-    assert!(run.take_incomplete().is_empty());
+    assert!(run.take_incomplete_chunks().is_empty());
     assert_eq!(
         run.take_notes().len(),
         0,
@@ -351,11 +351,11 @@ fn write_and_find_damage(
     job: &Job<'_>,
     index: u64,
     bytes: &[u8],
-) -> Option<Damage> {
+) -> Option<PartDamage> {
     let folder = Folder::new(&test_folder.result_path(), &job.layout).unwrap();
     fs::create_dir_all(&folder.path).unwrap();
     fs::write(folder.file(part_name(index)), bytes).unwrap();
-    let read_point_rows = |part: &PointPart<'_>| part.outcomes();
+    let read_point_rows = |part: &PointPart<'_>| part.read_point_rows();
     super::super::open::read_part(&PointParts::new(job), &folder, index, read_point_rows)
         .unwrap()
         .err()
@@ -391,7 +391,7 @@ fn any_truncation_of_a_part_is_found() {
     let lengthened_bytes = [bytes.as_slice(), &[0]].concat();
     assert_eq!(
         write_and_find_damage(&test_folder, &job, 3, &lengthened_bytes),
-        Some(Damage::Bytes)
+        Some(PartDamage::Bytes)
     );
 }
 
@@ -402,26 +402,26 @@ fn parts_of_another_plan_index_or_layout_are_foreign() {
     let bytes = part_bytes(&job, 3);
     assert_eq!(
         write_and_find_damage(&test_folder, &job, 4, &bytes),
-        Some(Damage::Foreign),
+        Some(PartDamage::Foreign),
         "another index"
     );
     let job_of_other_build = Job { numerics: 2, ..synthetic::job(POINT_COUNT) };
     assert_eq!(
         write_and_find_damage(&test_folder, &job_of_other_build, 3, &bytes),
-        Some(Damage::Foreign),
+        Some(PartDamage::Foreign),
         "another build"
     );
     let mut job_with_fewer_columns = synthetic::job(POINT_COUNT);
     job_with_fewer_columns.layout.columns.pop();
     assert_eq!(
         write_and_find_damage(&test_folder, &job_with_fewer_columns, 3, &bytes),
-        Some(Damage::Foreign),
+        Some(PartDamage::Foreign),
         "another layout"
     );
     // A result has a digest too, but is not a part.
     assert_eq!(
         write_and_find_damage(&test_folder, &job, 3, &uninterrupted_result_bytes(POINT_COUNT)),
-        Some(Damage::Foreign)
+        Some(PartDamage::Foreign)
     );
 }
 
@@ -467,7 +467,7 @@ fn rows_that_do_not_fit_their_part_are_refused() {
 
 /// Returns a strategy for rows of cells that fit the columns.
 fn row_strategy(columns: &[DeclaredColumn]) -> impl Strategy<Value = RowCells> + use<> {
-    let cell_strategy = |column: &DeclaredColumn| match &column.kind {
+    let cell_strategy = |column: &DeclaredColumn| match &column.cell_type {
         CellType::Count | CellType::Axis => any::<u64>().prop_map(Some).boxed(),
         CellType::Flag => prop::option::of(0..2_u64).boxed(),
         CellType::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
@@ -501,9 +501,9 @@ proptest! {
             rows_by_point.into_iter().zip(8..).map(to_point_rows).collect();
         let run = open_run(&test_folder.result_path(), &job);
         run.write_chunk(&job, 1, written_rows.clone()).unwrap();
-        prop_assert_eq!(run.stored_rows(8), written_rows.first().cloned());
+        prop_assert_eq!(run.find_stored_rows(8), written_rows.first().cloned());
         drop(run);
-        let incomplete_chunks = open_run(&test_folder.result_path(), &job).take_incomplete();
+        let incomplete_chunks = open_run(&test_folder.result_path(), &job).take_incomplete_chunks();
         let rows_read_back: Vec<PointRows> = incomplete_chunks.into_values().flatten().collect();
         prop_assert_eq!(rows_read_back, written_rows);
     }

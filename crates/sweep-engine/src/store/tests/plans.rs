@@ -23,7 +23,7 @@ fn another_plan_is_refused_with_the_difference_unless_fresh() {
         .to_string();
     assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
 
-    let fresh_options = OpenOptions { fresh: true, ..default_options() };
+    let fresh_options = OpenOptions { starts_over: true, ..default_options() };
     let OpenOutcome::Open(run) =
         OpenRun::open(&test_folder.result_path(), &job_with_other_plan, fresh_options).unwrap()
     else {
@@ -78,7 +78,7 @@ fn another_build_of_the_same_version_is_refused() {
         &job_of_other_build,
         default_options(),
     ));
-    let fresh_options = OpenOptions { fresh: true, ..default_options() };
+    let fresh_options = OpenOptions { starts_over: true, ..default_options() };
     assert!(matches!(
         OpenRun::open(&test_folder.result_path(), &job_of_other_build, fresh_options).unwrap(),
         OpenOutcome::Open(_)

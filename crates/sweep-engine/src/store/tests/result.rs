@@ -103,7 +103,7 @@ fn the_result_does_not_depend_on_the_order_of_chunks() {
     let test_folder = TestFolder::new();
     let job = synthetic::job(points);
     let run = open_run(&test_folder.result_path(), &job);
-    for chunk in (0..run.chunks()).rev() {
+    for chunk in (0..run.chunk_count()).rev() {
         write_complete_chunk(&run, chunk);
     }
     let (tally, _) = finish_run(run, &job);
@@ -130,7 +130,7 @@ fn a_mark_without_a_worse_side_leaves_the_other_extremes() {
     let rows = (0..POINT_COUNT).map(synthetic::row);
     let greatest_value =
         rows.filter_map(|row| job.layout.number(&row, "linear_a")).reduce(f64::max);
-    assert_eq!(tally.extremes[0].worst.as_ref().map(|worst| worst.value), greatest_value);
+    assert_eq!(tally.extremes[0].worst_value.as_ref().map(|worst| worst.value), greatest_value);
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn a_finished_result_is_not_computed_again() {
 
     // With `--fresh`, the old result stays until the new one replaces it.
     let old_bytes = fs::read(test_folder.result_path()).unwrap();
-    let fresh_options = OpenOptions { fresh: true, ..default_options() };
+    let fresh_options = OpenOptions { starts_over: true, ..default_options() };
     drop(OpenRun::open(&test_folder.result_path(), &job_with_other_plan, fresh_options).unwrap());
     assert_eq!(fs::read(test_folder.result_path()).unwrap(), old_bytes);
     let run = open_run(&test_folder.result_path(), &job_with_other_plan);

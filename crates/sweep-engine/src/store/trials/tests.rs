@@ -17,8 +17,11 @@ fn trial_columns() -> TrialColumns {
     let make_column =
         |name: &str, kind| DeclaredColumn::new(name, "1", format!("the {name}"), kind);
     TrialColumns {
-        keys: vec![make_column("candidate", CellType::Count), make_column("x", CellType::Axis)],
-        responses: vec![
+        key_columns: vec![
+            make_column("candidate", CellType::Count),
+            make_column("x", CellType::Axis),
+        ],
+        value_columns: vec![
             make_column("cost", CellType::Measured),
             make_column("excess", CellType::Measured),
         ],
@@ -42,7 +45,7 @@ fn key_and_response(k: u64) -> (TrialKey, RowCells) {
 fn add_trials(trials: &mut Trials, range: std::ops::Range<u64>) {
     for k in range {
         let (key, response) = key_and_response(k);
-        trials.add(key, response).unwrap();
+        trials.add_trial(key, response).unwrap();
     }
 }
 
@@ -63,7 +66,7 @@ fn trials_of_several_processes_are_stored_in_few_parts() {
     // Each process writes several times, and then adds a trial that it does not write.
     for from in (0..TRIAL_COUNT).step_by(100) {
         let mut trials = open_trials(&output, &job);
-        assert_eq!(trials.count() as u64, from);
+        assert_eq!(trials.trial_count() as u64, from);
         add_trials(&mut trials, from..from + 60);
         trials.write().unwrap();
         add_trials(&mut trials, from + 60..from + 100);
@@ -72,12 +75,12 @@ fn trials_of_several_processes_are_stored_in_few_parts() {
         add_trials(&mut trials, TRIAL_COUNT..TRIAL_COUNT + 1);
     }
     let trials = open_trials(&output, &job);
-    assert_eq!(trials.count() as u64, TRIAL_COUNT);
+    assert_eq!(trials.trial_count() as u64, TRIAL_COUNT);
     for k in 0..TRIAL_COUNT {
         let (key, response) = key_and_response(k);
-        assert_eq!(trials.find_response(&key), Some(&response), "trial {k}");
+        assert_eq!(trials.find_values(&key), Some(&response), "trial {k}");
     }
-    assert_eq!(trials.find_response(&[0, 1]), None);
+    assert_eq!(trials.find_values(&[0, 1]), None);
     let names = [0, 1, 2].map(|index| format!("part-{index:08}.parquet"));
     assert_eq!(part_names(&output), names);
     // The columns of parts have names.
@@ -108,7 +111,7 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
         fs::write(folder.join("part-00000001.parquet"), &bytes).unwrap();
         fs::write(folder.join("part-00000002.parquet"), &third_part).unwrap();
         let mut trials = open_trials(&output, &job);
-        assert_eq!(trials.count(), 3000 - PART_ROWS, "byte {position}");
+        assert_eq!(trials.trial_count(), 3000 - PART_ROWS, "byte {position}");
         let notes = trials.take_notes();
         assert!(notes[0].contains("part-00000001.parquet.damaged"), "{notes:?}");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 4 + k + 1);
@@ -117,7 +120,7 @@ fn a_damaged_part_loses_only_the_trials_in_it() {
         trials.write().unwrap();
         drop(trials);
         let (key, response) = key_and_response(1030);
-        assert_eq!(open_trials(&output, &job).find_response(&key), Some(&response));
+        assert_eq!(open_trials(&output, &job).find_values(&key), Some(&response));
     }
     // A foreign file with the name of a part is kept.
     fs::write(folder.join("part-00000001.parquet"), "my thesis").unwrap();
@@ -144,7 +147,7 @@ fn another_plan_is_refused_unless_fresh() {
     else {
         panic!()
     };
-    assert_eq!(trials.count(), 0);
+    assert_eq!(trials.trial_count(), 0);
     assert!(part_names(&output).is_empty());
     let busy_error = Trials::open(&output, &job_with_other_plan, trial_columns(), false);
     assert!(matches!(busy_error, Err(StoreError::Busy { .. })), "{busy_error:?}");
