@@ -181,7 +181,7 @@ impl AttractorEngine {
             count: if search.carry.is_some() { 1 } else { search.starts as usize },
             max_kick_rad_per_s: search.kick,
             max_time_s: search.longest,
-            with_threshold: search.threshold,
+            finds_threshold: search.threshold,
             recorders,
         };
         Self { search, starts, columns: search.row_columns(plan) }

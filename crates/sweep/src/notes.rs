@@ -1,6 +1,6 @@
 //! The notes of `check` on a plan.
 
-use washer_model::{Point, Spin, stops_at_rest_n};
+use washer_model::{Point, Spin, stop_forces_at_rest_n};
 use washer_row::Criterion;
 
 use crate::plan::{Plan, point_input, prepare_input};
@@ -21,7 +21,7 @@ fn rest_note(plan: &Plan) -> Option<(&'static str, String)> {
 
 /// Returns a text on the stop with the greatest force at rest, if the machine rests on it.
 fn describe_most_loaded_stop(point: &Point) -> Option<String> {
-    let forces_n = stops_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
+    let forces_n = stop_forces_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
     let (force_n, stop) = forces_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (force_n > MIN_RESTING_FORCE_RATIO * point.weight_n()).then(|| {
         let [force_n, weight_n] = [force_n, point.weight_n()].map(f64::round);

@@ -10,7 +10,8 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde_json::{Value, json};
 use washer_model::{
     COORDINATES, History, HistoryRequest, InitialDeviation, Method, ModelKind, NoEquilibrium,
-    Point, PointInput, Spin, StepSelector, Timing, histories, histories_per_batch, instant_count,
+    Point, PointInput, Spin, StepSelector, Timing, histories_per_batch, instant_count,
+    integrate_histories,
 };
 
 use crate::engine::{CappedRun, reference_method};
@@ -316,10 +317,10 @@ fn integrate<'a>(
         let requests = runs.iter().map(|run| HistoryRequest {
             point: &run.point,
             method: run.methods[usize::from(kind == ModelKind::Linear)],
-            start: run.start,
+            initial_deviation: run.start,
             times_s: run.times_s.clone(),
         });
-        histories(kind, requests.collect(), cancel)
+        integrate_histories(kind, requests.collect(), cancel)
     };
     let grouped_histories: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
         Some(_) => groups.par_iter().map(integrate_group).collect(),

@@ -175,7 +175,7 @@ pub extern "C" fn washer_dimension() -> usize {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_initial_state(machine: *const WasherEquations, x: *mut f64) {
     // SAFETY: the caller guarantees valid pointers.
-    unsafe { ptr::copy_nonoverlapping((*machine).0.at_rest().as_ptr(), x, STATE_LEN) };
+    unsafe { ptr::copy_nonoverlapping((*machine).0.rest_state().as_ptr(), x, STATE_LEN) };
 }
 
 /// Computes dx = f(t, x).

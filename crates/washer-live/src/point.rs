@@ -4,7 +4,7 @@ use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Disturbance, HeldSpeed, InitialDeviation, Method, ModelKind, Point, PointInput,
-    Response, StartRule, Timing, find_attractors, find_responses, history, prepare,
+    Response, StartRule, Timing, find_attractors, find_responses, integrate_history, prepare,
 };
 use washer_row::{
     Deviations, DwellPeaks, LevelRun, MethodKind, NextStep, Outcome, OutcomePurpose,
@@ -214,8 +214,8 @@ pub fn motion(
     let levels = &refinement_levels(setup, values)[model as usize];
     let method = level_index.and_then(|level_index| levels.levels.get(level_index));
     let method = method.unwrap_or(&levels.levels[quick_level_index(levels)]);
-    let history = history(model, method, &point, &InitialDeviation::default(), every_s);
-    let instants = (0..history.len()).filter_map(|k| history.instant(k));
+    let history = integrate_history(model, method, &point, &InitialDeviation::default(), every_s);
+    let instants = (0..history.len()).filter_map(|k| history.instant_outputs(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
 }

@@ -50,7 +50,7 @@ impl<F: ModelFamily> Kernel for RhsPartKernel<'_, F> {
         let coupling = Coupling::new(zero, caps.as_ref());
         let model = <F::OnLanes<T> as LaneModel<T>>::splat(zero, point, coupling);
         let mut x = [zero; STATES];
-        for (x, at_rest) in x.iter_mut().zip(<F::OnLanes<T> as LaneModel<T>>::at_rest(point)) {
+        for (x, at_rest) in x.iter_mut().zip(<F::OnLanes<T> as LaneModel<T>>::rest_state(point)) {
             *x = zero.lit(at_rest);
         }
         let mut t = zero.lit(10.0);

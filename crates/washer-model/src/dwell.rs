@@ -21,8 +21,8 @@ use exponent::compute_exponents;
 use lane_ode::{Cancel, Simd};
 use multipliers::{PeriodicOrbit, compute_growths_per_s};
 use starts::{
-    Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
-    random_kick_count,
+    Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, perturb,
+    plan_kicks, random_kick_count,
 };
 use std::sync::Arc;
 use trajectory::{BLOCK_TURNS, HeldTrajectory, NextComputation, WINDOW_TURNS, are_peaks_close};
@@ -58,7 +58,7 @@ pub struct StartRule {
     /// The maximum time of a trajectory (s).
     pub max_time_s: f64,
     /// Whether to search for the smallest kick after which the machine does not return.
-    pub with_threshold: bool,
+    pub finds_threshold: bool,
     /// The recorders of additional outputs of each motion.
     pub recorders: Recorders,
 }
@@ -69,7 +69,7 @@ impl Default for StartRule {
             count: 12,
             max_kick_rad_per_s: 6.0,
             max_time_s: 600.0,
-            with_threshold: false,
+            finds_threshold: false,
             recorders: Recorders::default(),
         }
     }
@@ -162,7 +162,7 @@ pub struct Attractors {
     /// The number of starts.
     pub starts: u32,
     /// The smallest tried kick (rad/s) after which the machine does not return to the first motion;
-    /// `None` if it always returns, or without [`StartRule::with_threshold`].
+    /// `None` if it always returns, or without [`StartRule::finds_threshold`].
     pub threshold_rad_per_s: Option<f64>,
 }
 
@@ -226,8 +226,8 @@ pub fn find_attractors_from_responses(
             }
         };
         let carried_state = carried_states.get(k).copied().flatten();
-        let search = |held_case| SpeedSearch::new(held_case, responses, carried_state, rule);
-        searches.push(settings.held_case(held_speed.speed_rpm).map(search));
+        let new_search = |held_case| SpeedSearch::new(held_case, responses, carried_state, rule);
+        searches.push(settings.held_case(held_speed.speed_rpm).map(new_search));
     }
     let mut is_complete = run_to_end(simd, &mut searches, cancel);
     for search in searches.iter_mut().flatten() {
@@ -237,7 +237,7 @@ pub fn find_attractors_from_responses(
     for search in searches.iter_mut().flatten() {
         search.find_transients();
     }
-    if rule.with_threshold {
+    if rule.finds_threshold {
         for search in searches.iter_mut().flatten() {
             search.find_brackets();
         }
@@ -303,20 +303,20 @@ fn run_to_end(
         let mut exponent_trajectories = Vec::new();
         let mut exponent_requests = Vec::new();
         let mut multiplier_trajectories: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
-        let mut orbits: Vec<PeriodicOrbit<'_, '_>> = Vec::new();
+        let mut periodic_orbits: Vec<PeriodicOrbit<'_, '_>> = Vec::new();
         for search in searches.iter_mut().flatten() {
             let direction = search.directions[MODE_DIRECTIONS - 1];
             let held_case = &search.held_case;
             for trajectory in &mut search.trajectories {
                 match trajectory.next_computation {
                     NextComputation::Turns => turn_trajectories.push(trajectory),
-                    NextComputation::Multipliers(period) => {
-                        orbits.push(PeriodicOrbit {
+                    NextComputation::Multipliers(period_turns) => {
+                        periodic_orbits.push(PeriodicOrbit {
                             held_case,
                             held_state: trajectory.held_state,
-                            period,
+                            period_turns,
                         });
-                        multiplier_trajectories.push((trajectory, period));
+                        multiplier_trajectories.push((trajectory, period_turns));
                     }
                     NextComputation::Exponent => {
                         exponent_requests.push((trajectory.held_state, direction));
@@ -332,10 +332,11 @@ fn run_to_end(
         {
             return true;
         }
-        let growths = compute_growths_per_s(&orbits, cancel);
-        for ((trajectory, period), growth_per_s) in multiplier_trajectories.into_iter().zip(growths)
+        let growths_per_s = compute_growths_per_s(&periodic_orbits, cancel);
+        for ((trajectory, period_turns), growth_per_s) in
+            multiplier_trajectories.into_iter().zip(growths_per_s)
         {
-            trajectory.add_growth(period, growth_per_s);
+            trajectory.add_growth(period_turns, growth_per_s);
         }
         let held_states: Vec<HeldState<'_>> =
             turn_trajectories.iter().map(|trajectory| trajectory.held_state).collect();
@@ -401,7 +402,7 @@ impl<'a> SpeedSearch<'a> {
     ) -> Self {
         let point = held_case.setup.point;
         let frozen_modes: Arc<Modes> = Arc::clone(&held_case.frozen_modes);
-        let rest_state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
+        let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
         let kicked_state = responses.first().map_or(rest_state, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));
@@ -415,7 +416,7 @@ impl<'a> SpeedSearch<'a> {
                 |start| (perturb(point, &frozen_modes, start), Origin::Response);
             states.extend(response_states.iter().map(to_perturbed_start));
             let count = rule.count.saturating_sub(states.len());
-            for kick in kicks(count, rule.max_kick_rad_per_s) {
+            for kick in plan_kicks(count, rule.max_kick_rad_per_s) {
                 let (state, origin) = match is_from_rest(kick) {
                     true => (&rest_state, Origin::Rest),
                     false => (&kicked_state, Origin::Kicked(kick)),
@@ -437,12 +438,12 @@ impl<'a> SpeedSearch<'a> {
             random_threshold_rad_per_s: None,
         };
         for (state, origin) in states {
-            search.start(state, origin);
+            search.start_trajectory(state, origin);
         }
         search
     }
 
-    fn start(&mut self, state: [f64; STATES], origin: Origin) {
+    fn start_trajectory(&mut self, state: [f64; STATES], origin: Origin) {
         let held_state = HeldState { setup: self.held_case.setup, state };
         let is_unstable = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable_responses = self.responses.iter().filter(is_unstable);
@@ -471,9 +472,9 @@ impl<'a> SpeedSearch<'a> {
 
     /// Returns the trajectories that started from states of a trajectory's motion.
     fn find_survivors(&self, trajectory: usize) -> Option<core::ops::Range<usize>> {
-        let attractor = self.trajectories[trajectory].attractor();
+        let attractor = self.trajectories[trajectory].to_attractor();
         let is_same_motion = |(other, _): &&(usize, core::ops::Range<usize>)| {
-            are_same_motion(&self.trajectories[*other].attractor(), &attractor)
+            are_same_motion(&self.trajectories[*other].to_attractor(), &attractor)
         };
         self.survivors.iter().find(is_same_motion).map(|(_, survivors)| survivors.clone())
     }
@@ -481,7 +482,7 @@ impl<'a> SpeedSearch<'a> {
     /// Marks chaotic motions as transients if one of the trajectories from their states ended in
     /// another motion.
     fn find_transients(&mut self) {
-        let mut lives: Vec<(usize, f64)> = Vec::new();
+        let mut mean_lives_s: Vec<(usize, f64)> = Vec::new();
         for chaotic in (0..self.start_count).filter(|&start| self.trajectories[start].is_chaotic())
         {
             let Some(survivors) = self.find_survivors(chaotic) else { continue };
@@ -489,10 +490,10 @@ impl<'a> SpeedSearch<'a> {
             let ended_count = survivors.iter().filter(|trajectory| trajectory.has_ended()).count();
             if ended_count > 0 {
                 let time_s: f64 = survivors.iter().map(HeldTrajectory::time_s).sum();
-                lives.push((chaotic, time_s / ended_count as f64));
+                mean_lives_s.push((chaotic, time_s / ended_count as f64));
             }
         }
-        for (trajectory, life_s) in lives {
+        for (trajectory, life_s) in mean_lives_s {
             self.trajectories[trajectory].mark_transient(life_s);
         }
     }
@@ -500,8 +501,8 @@ impl<'a> SpeedSearch<'a> {
     /// Whether a trajectory ended in the motion of the first one.
     fn returns_to_first(&self, trajectory: usize) -> bool {
         are_same_motion(
-            &self.trajectories[0].attractor(),
-            &self.trajectories[trajectory].attractor(),
+            &self.trajectories[0].to_attractor(),
+            &self.trajectories[trajectory].to_attractor(),
         )
     }
 
@@ -513,27 +514,29 @@ impl<'a> SpeedSearch<'a> {
                 && direction >= MODE_DIRECTIONS
                 && !self.returns_to_first(trajectory)
             {
-                let smallest =
-                    self.random_threshold_rad_per_s.map_or(size, |smallest| smallest.min(size));
-                self.random_threshold_rad_per_s = Some(smallest);
+                let smallest_kick_rad_per_s = self
+                    .random_threshold_rad_per_s
+                    .map_or(size, |smallest_kick_rad_per_s| smallest_kick_rad_per_s.min(size));
+                self.random_threshold_rad_per_s = Some(smallest_kick_rad_per_s);
             }
         }
         for direction in 0..MODE_DIRECTIONS {
-            let mut kicks: Vec<(f64, bool)> = Vec::new();
+            let mut direction_kicks: Vec<(f64, bool)> = Vec::new();
             for (trajectory, origin) in self.origins.iter().enumerate() {
                 if let Origin::Kicked((kick_direction, size)) = *origin
                     && kick_direction == direction
                 {
-                    kicks.push((size, self.returns_to_first(trajectory)));
+                    direction_kicks.push((size, self.returns_to_first(trajectory)));
                 }
             }
-            kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let first_index_above = kicks.iter().position(|(_, has_returned)| !has_returned);
+            direction_kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let first_index_above =
+                direction_kicks.iter().position(|(_, has_returned)| !has_returned);
             self.brackets[direction] = first_index_above.map(|first_index_above| {
-                let last_index_below = first_index_above
+                let size_below = first_index_above
                     .checked_sub(1)
-                    .map_or(0.0, |last_index_below| kicks[last_index_below].0);
-                [last_index_below, kicks[first_index_above].0]
+                    .map_or(0.0, |index_below| direction_kicks[index_below].0);
+                [size_below, direction_kicks[first_index_above].0]
             });
         }
     }
@@ -544,15 +547,15 @@ impl<'a> SpeedSearch<'a> {
             if let Some([below, above]) = self.brackets[direction] {
                 let kick = (direction, 0.5 * (below + above));
                 let state = add_kick(&self.kicked_state, &self.directions, kick);
-                self.start(state, Origin::Kicked(kick));
+                self.start_trajectory(state, Origin::Kicked(kick));
             }
         }
     }
 
     /// Halves the brackets by the outcomes of the trajectories from their midpoints.
     fn bisect_brackets(&mut self) {
-        let midpoints = self.brackets.iter().flatten().count();
-        for trajectory in self.trajectories.len() - midpoints..self.trajectories.len() {
+        let midpoint_count = self.brackets.iter().flatten().count();
+        for trajectory in self.trajectories.len() - midpoint_count..self.trajectories.len() {
             let has_returned = self.returns_to_first(trajectory);
             if let Origin::Kicked((direction, size)) = self.origins[trajectory]
                 && let Some(bracket) = &mut self.brackets[direction]
@@ -566,7 +569,7 @@ impl<'a> SpeedSearch<'a> {
         let mut motions: Vec<Attractor> = Vec::new();
         for (trajectory, origin) in self.trajectories[..self.start_count].iter().zip(&self.origins)
         {
-            let mut attractor = trajectory.attractor();
+            let mut attractor = trajectory.to_attractor();
             attractor.least_kick_rad_per_s = match origin {
                 Origin::Response => Some(0.0),
                 Origin::Kicked((_, size)) => Some(*size),
@@ -582,7 +585,7 @@ impl<'a> SpeedSearch<'a> {
         for trajectory in
             transient_trajectories.filter(|&trajectory| self.trajectories[trajectory].has_ended())
         {
-            let attractor = Attractor { starts: 0, ..self.trajectories[trajectory].attractor() };
+            let attractor = Attractor { starts: 0, ..self.trajectories[trajectory].to_attractor() };
             if !motions.iter().any(|motion| are_same_motion(motion, &attractor)) {
                 motions.push(attractor);
             }
@@ -645,7 +648,7 @@ impl Attractor {
     ];
 
     /// Returns the index of the motion's kind in [`Self::KIND_NAMES`].
-    pub fn kind(&self) -> usize {
+    pub fn kind_index(&self) -> usize {
         match (self.motion_kind, self.status) {
             (Some(MotionKind::Periodic { turns }), _) => (turns as usize).min(3) - 1,
             (Some(MotionKind::QuasiPeriodic { .. }), _) => 3,
@@ -660,8 +663,8 @@ impl Attractor {
     /// chaotic or have not settled are those of all their starts.
     fn merge(&mut self, other: &Self) {
         let starts = self.starts + 1;
-        let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
-        let least_kick_rad_per_s = kicks.into_iter().flatten().reduce(f64::min);
+        let kicks_rad_per_s = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
+        let least_kick_rad_per_s = kicks_rad_per_s.into_iter().flatten().reduce(f64::min);
         if self.motion_kind.is_none() && other.motion_kind.is_some() {
             *self = other.clone();
         } else if matches!(self.motion_kind, None | Some(MotionKind::Chaotic)) {

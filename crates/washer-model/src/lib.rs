@@ -112,10 +112,10 @@ pub use point::{NoEquilibrium, Point, Timing};
 pub use preparation::prepare;
 pub use run::equations::{PointEquations, STATE_LEN};
 pub use run::history::{
-    History, HistoryRequest, InitialDeviation, InstantOutputs, histories, histories_per_batch,
-    history, instant_count,
+    History, HistoryRequest, InitialDeviation, InstantOutputs, histories_per_batch, instant_count,
+    integrate_histories, integrate_history,
 };
-pub use run::suspension::{Forces, stops_at_rest_n};
+pub use run::suspension::{SuspensionForces, stop_forces_at_rest_n};
 pub use run::{
     Checkpoint, Checkpoints, Gauge, Method, MethodKind, Reading, Record, Recorders, Snapshot,
     simulate, simulate_until, simulate_with,

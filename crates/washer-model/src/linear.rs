@@ -22,7 +22,7 @@ use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLE_ANGLES};
 use crate::linear::rotor_terms::{ENTRIES, INERTIA_ENTRIES, ROWS, RotorCoefficients};
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::{Bodies, Coefficients};
+use crate::nonlinear::coefficients::{Bodies, MachineCoefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{Half, assemble_rotor_in_lanes, assemble_tub};
@@ -57,7 +57,7 @@ pub(crate) struct LinearModel {
 
 /// The linearisation of one machine per lane about the equilibrium `q`.
 pub(crate) struct Linearisation<'a, T> {
-    pub(crate) machine: &'a Coefficients<T>,
+    pub(crate) machine: &'a MachineCoefficients<T>,
     pub(crate) q: &'a [N<T>; COORDINATES],
 }
 
@@ -154,7 +154,7 @@ impl<T: Lane> OutOfLine for Linearisation<'_, T> {
 /// Computes stiffness and damping of the tub about the equilibrium `q`, as in [`LinearConstants`].
 #[inline(always)]
 pub(crate) fn tub_tangents<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     q: &[N<T>; COORDINATES],
 ) -> [[[N<T>; 4]; 4]; 2] {
     let zero = q[0].lit(0.0);
@@ -271,7 +271,7 @@ impl LinearModel {
         let unit_deflection = |i: usize| {
             let mut unit_coordinates = [N(0.0); COORDINATES];
             unit_coordinates[i] = N(1.0);
-            Deflection::linear(&unit_coordinates, tub_axis, rotor_axis)
+            Deflection::from_linear_model(&unit_coordinates, tub_axis, rotor_axis)
         };
         let generalised_force = |i: usize, load: &AxisLoad<f64>| {
             let Deflection { offset, tilt } = unit_deflection(i);

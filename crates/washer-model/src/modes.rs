@@ -60,11 +60,11 @@ impl Mode {
     }
 
     /// Returns the hinge's share of the mode's strain energy at the greatest deflection.
-    pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
-        let squared = HINGE_COORDINATES
+    pub(crate) fn hinge_energy_share(&self, point: &Point) -> f64 {
+        let squared_amplitudes = HINGE_COORDINATES
             .map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
         let stiffness = point.machine.bodies.flexure_stiffness.0;
-        stiffness * (squared[0] + squared[1])
+        stiffness * (squared_amplitudes[0] + squared_amplitudes[1])
             / (self.magnitude_rad_per_s * self.magnitude_rad_per_s)
     }
 
@@ -131,17 +131,17 @@ pub(crate) fn modes_with_caps(
     let decomposition = system.matrix.eigen().map_err(|_| ModesError::Eigenvalues)?;
     let eigenvalues = decomposition.S().column_vector();
     let eigenvectors = decomposition.U();
-    let shape = |state: usize| {
+    let mode_shape = |state: usize| {
         normalize_to_unit_mass(&mass, &core::array::from_fn(|i| eigenvectors[(i, state)]))
     };
-    let similarity = |a: usize, b: usize| modal_assurance(&mass, &shape(a), &shape(b));
-    let motions =
+    let similarity = |a: usize, b: usize| modal_assurance(&mass, &mode_shape(a), &mode_shape(b));
+    let sorted_roots =
         sort_into_modes((0..STATES).map(|k| eigenvalues[k] * system.unit_per_s), &similarity)?;
-    let modes = motions.map(|(ModeRoot { s, magnitude_rad_per_s }, state)| Mode {
+    let modes = sorted_roots.map(|(ModeRoot { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
         magnitude_rad_per_s,
-        shape: shape(state),
+        shape: mode_shape(state),
     });
     Ok(Modes { modes, mass })
 }
@@ -231,9 +231,9 @@ fn normalize_to_unit_mass(
         }
     }
     let rotated_vector = vector.map(|v| v * largest_entry.conj() / largest_entry.norm_sqr());
-    let pairs = rotated_vector.map(|v| [v.re, v.im]);
-    let scale = mass_inner_product(mass, &pairs, &pairs)[0].sqrt();
-    pairs.map(|[re, im]| [re / scale, im / scale])
+    let complex_pairs = rotated_vector.map(|v| [v.re, v.im]);
+    let mass_norm = mass_inner_product(mass, &complex_pairs, &complex_pairs)[0].sqrt();
+    complex_pairs.map(|[re, im]| [re / mass_norm, im / mass_norm])
 }
 
 /// Computes the largest |s| (rad/s) of a machine at a spin speed, over a turn of theta: about the
@@ -262,8 +262,8 @@ pub fn highest_explicit_frequency_rad_per_s(
     point: &Point,
     speed_rad_per_s: f64,
 ) -> Result<f64, ModesError> {
-    let cap = 1.0 / (GAMMA * ADDITIVE_STEP_S);
-    let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
+    let cap_rad_per_s = 1.0 / (GAMMA * ADDITIVE_STEP_S);
+    let caps = Caps { bearings_rad_per_s: cap_rad_per_s, hinge_rad_per_s: Some(cap_rad_per_s) };
     highest_capped_frequency_rad_per_s(point, ModelKind::Nonlinear, speed_rad_per_s, Some(&caps))
 }
 
@@ -276,21 +276,21 @@ pub(crate) fn highest_capped_frequency_rad_per_s(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<f64, ModesError> {
-    let mut highest = 0.0_f64;
-    let steepest = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
-    let models = core::iter::once(&point.linear).chain(steepest);
+    let mut highest_rad_per_s = 0.0_f64;
+    let steepest_model = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
+    let models = core::iter::once(&point.linear).chain(steepest_model);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
         let system = first_order_system(point, model, theta, speed_rad_per_s, caps)?;
         for s in system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)? {
-            let magnitude = magnitude(s) * system.unit_per_s;
-            if !magnitude.is_finite() {
+            let magnitude_rad_per_s = magnitude(s) * system.unit_per_s;
+            if !magnitude_rad_per_s.is_finite() {
                 return Err(ModesError::Eigenvalues);
             }
-            highest = highest.max(magnitude);
+            highest_rad_per_s = highest_rad_per_s.max(magnitude_rad_per_s);
         }
     }
-    Ok(highest)
+    Ok(highest_rad_per_s)
 }
 
 /// Computes the highest undamped natural frequency (rad/s) of tub and rotor as one rigid body.
@@ -340,21 +340,21 @@ fn first_order_system(
     let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(0.0));
     let mut matrices = model.matrices(bodies, &spin);
     if let Some(caps) = caps {
-        let bearings = model.bearing_stiffness(bodies);
+        let bearing_stiffness = model.bearing_stiffness(bodies);
         let cap_squared = caps.bearings_rad_per_s * caps.bearings_rad_per_s;
         let speed_squared = speed_rad_per_s * speed_rad_per_s;
         for i in 0..COORDINATES {
             for j in 0..COORDINATES {
-                matrices.mass[i][j] += bearings[i][j] / cap_squared;
-                matrices.stiffness[i][j] += bearings[i][j] * (speed_squared / cap_squared);
+                matrices.mass[i][j] += bearing_stiffness[i][j] / cap_squared;
+                matrices.stiffness[i][j] += bearing_stiffness[i][j] * (speed_squared / cap_squared);
             }
         }
-        if let Some(cap) = caps.hinge_rad_per_s {
-            let inertia = bodies.flexure_stiffness.0 / (cap * cap);
+        if let Some(hinge_cap) = caps.hinge_rad_per_s {
+            let hinge_inertia = bodies.flexure_stiffness.0 / (hinge_cap * hinge_cap);
             for q in HINGE_COORDINATES {
-                matrices.mass[q][q] += inertia;
+                matrices.mass[q][q] += hinge_inertia;
             }
-            let torque_per_speed = (1.0 + BACKWARD_WHIRL_RATIO) * speed_rad_per_s * inertia;
+            let torque_per_speed = (1.0 + BACKWARD_WHIRL_RATIO) * speed_rad_per_s * hinge_inertia;
             let [hinge_yaw, hinge_pitch] = HINGE_COORDINATES;
             matrices.damping[hinge_yaw][hinge_pitch] -= torque_per_speed;
             matrices.damping[hinge_pitch][hinge_yaw] += torque_per_speed;

@@ -22,7 +22,7 @@ use crate::coordinates::{
     TUB_Z,
 };
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::{Bodies, Coefficients};
+use crate::nonlinear::coefficients::{Bodies, MachineCoefficients};
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{FloatingChain, LdltFactors};
@@ -47,7 +47,7 @@ pub(crate) struct Halves<T> {
 /// forces in both halves.
 #[inline(always)]
 pub(crate) fn assemble_coupled_halves<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
@@ -64,7 +64,7 @@ pub(crate) fn assemble_coupled_halves<T: Lane>(
 /// and hinge at the equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
     spin: &SpinState<T>,
@@ -77,14 +77,21 @@ pub(crate) fn accelerations<T: Lane>(
     let rotor_factors = LdltFactors::new(rotor.inertia);
     let tub = (&tub.chain, &tub_factors);
     let rotor = (&rotor.chain, &rotor_factors);
-    coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
+    coupling.accelerations(
+        &machine.bodies,
+        spin.speed,
+        &deflection,
+        &sag.bearing_deflection,
+        tub,
+        rotor,
+    )
 }
 
 /// Computes the change of all accelerations per unit of generalised force on each of the tub's
 /// coordinates.
 #[inline(always)]
 pub(crate) fn accelerations_per_load<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
     spin: &SpinState<T>,
@@ -98,7 +105,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     let bodies = &machine.bodies;
     let speed = spin.speed;
     let mut unloaded_accelerations = [speed; COORDINATES];
-    let mut per_load = [[speed; COORDINATES]; 4];
+    let mut changes_per_load = [[speed; COORDINATES]; 4];
     // The first pass of the loop has no load, so that the code with and without a load is compiled
     // once.
     for load_case in 0..=TUB_COORDINATES.len() {
@@ -109,21 +116,21 @@ pub(crate) fn accelerations_per_load<T: Lane>(
         let tub = (&chain, &tub_factors);
         let rotor = (&rotor.chain, &rotor_factors);
         let accelerations =
-            coupling.accelerations(bodies, speed, &deflection, &sag.bearings, tub, rotor);
+            coupling.accelerations(bodies, speed, &deflection, &sag.bearing_deflection, tub, rotor);
         if load_case == 0 {
             unloaded_accelerations = accelerations;
         } else {
-            per_load[load_case - 1] = subtract(accelerations, &unloaded_accelerations);
+            changes_per_load[load_case - 1] = subtract(accelerations, &unloaded_accelerations);
         }
     }
-    per_load
+    changes_per_load
 }
 
 /// Computes both halves without the bearings' forces. If the hinge's modes are capped, the rotor
 /// includes the hinge's scaled mass.
 #[inline(always)]
 fn assemble_uncoupled_halves<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
     spin: &SpinState<T>,
@@ -148,39 +155,39 @@ fn assemble_uncoupled_halves<T: Lane>(
 /// Computes the equations of the tub T about its mass centre.
 #[inline(always)]
 pub(crate) fn assemble_tub<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 2> {
     let b = &machine.bodies;
     let tilt = Tilt::tub(q);
     let motion = tilt.motion_at_constant_speeds(u[TUB_YAW], u[TUB_PITCH]);
-    let [x, y, z] = motion.rate;
+    let [x, y, z] = motion.angular_velocity;
     let midpoint = [q[TUB_Y], q[TUB_Z]];
     let velocity = [u[TUB_Y], u[TUB_Z]];
-    let tub = TubMotion::from_rate(tilt, motion.rate, midpoint, velocity);
+    let tub = TubMotion::from_rate(tilt, motion.angular_velocity, midpoint, velocity);
     let (force, moment) = machine.elements.load_on_tub(&tub);
     // The force's components along c2 and c3.
     let force = [
-        tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
-        tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
+        tilt.axis_c[1] * force[0] + tilt.second_axis_c[1] * force[1],
+        tilt.axis_c[2] * force[0] + tilt.second_axis_c[2] * force[1] + tilt.cos_yaw * force[2],
     ];
-    let centre = b.tub_centre;
+    let centre_x = b.tub_centre_x;
 
     // Inertia moments I alpha + omega x I omega in tub axes, for constant generalised speeds u.
     let inertia_moment = [
-        b.tub_i11 * motion.acceleration_x + (b.tub_i33 - b.tub_i22) * (y * z),
-        b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
+        b.tub_i11 * motion.angular_acceleration_x + (b.tub_i33 - b.tub_i22) * (y * z),
+        b.tub_i22 * motion.angular_acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
         ((b.tub_i22 - b.tub_i11) * (x * y)).v(),
     ];
     let moment = subtract(moment, &inertia_moment);
 
     // The mass centre L_T t1 (Eq. 8): partial velocities in cabinet axes, and acceleration.
-    let arm_yaw_x = (centre * tilt.axis_c[2]).v();
-    let arm_yaw_z = (centre * tilt.axis_yaw_z()).v();
-    let arm_pitch = scale(centre, tilt.second_c);
+    let arm_yaw_x = (centre_x * tilt.axis_c[2]).v();
+    let arm_yaw_z = (centre_x * tilt.axis_yaw_z()).v();
+    let arm_pitch = scale(centre_x, tilt.second_axis_c);
     let axis_drift = tilt.rotate_to_cabinet(&motion.axis_acceleration);
-    let drift = scale(centre, axis_drift);
+    let drift = scale(centre_x, axis_drift);
 
     let axial_force = (b.tub_mass * drift[0]).v();
     let torque_yaw = tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]
@@ -189,7 +196,7 @@ pub(crate) fn assemble_tub<T: Lane>(
     let torque_pitch =
         moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial_force * arm_pitch[0];
 
-    let axial_yaw = (b.tub_mass * arm_yaw_x).v();
+    let mass_times_axial_arm = (b.tub_mass * arm_yaw_x).v();
     let s = tilt.sin_pitch;
     let c = tilt.cos_pitch;
     let zero = s.lit(0.0);
@@ -204,9 +211,9 @@ pub(crate) fn assemble_tub<T: Lane>(
             torque: [torque_yaw, torque_pitch],
         },
         inertia: [
-            [axial_yaw * arm_yaw_x + (b.tub_i11 * (s * s) + b.tub_i22 * (c * c)), zero],
+            [mass_times_axial_arm * arm_yaw_x + (b.tub_i11 * (s * s) + b.tub_i22 * (c * c)), zero],
             [
-                (axial_yaw * arm_pitch[0]).v(),
+                (mass_times_axial_arm * arm_pitch[0]).v(),
                 b.tub_i33 + b.tub_mass * (arm_pitch[0] * arm_pitch[0]),
             ],
         ],
@@ -271,13 +278,13 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     // Angular velocities, and angular accelerations for constant generalised speeds u: of the shaft
     // in axes S, then of the drum in axes E.
     let omega_s = {
-        let [x, y, z] = to_shaft_axes(spin, &motion.rate);
+        let [x, y, z] = to_shaft_axes(spin, &motion.angular_velocity);
         [x + spin.speed, y, z]
     };
     let alpha_s = [
-        motion.acceleration_x + spin.acceleration,
-        spin.cos * motion.acceleration_y + spin.speed * omega_s[2],
-        -(spin.sin * motion.acceleration_y + spin.speed * omega_s[1]),
+        motion.angular_acceleration_x + spin.acceleration,
+        spin.cos * motion.angular_acceleration_y + spin.speed * omega_s[2],
+        -(spin.sin * motion.angular_acceleration_y + spin.speed * omega_s[1]),
     ];
     let [ex, ey, ez] =
         [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
@@ -385,9 +392,9 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
 
     let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
-        let axial_moment = (b.rotor_mass * axial_arm[r]).v();
+        let mass_times_axial_arm = (b.rotor_mass * axial_arm[r]).v();
         for s in 0..=r {
-            inertia[r][s] += axial_moment * axial_arm[s];
+            inertia[r][s] += mass_times_axial_arm * axial_arm[s];
         }
     }
     Half {
@@ -422,11 +429,11 @@ fn drum_inertia_in_e<T: Real, const SKEWED: bool>(
     s10: N<T>,
     c10: N<T>,
 ) -> DrumInertia<T> {
-    let difference = b.drum_i11 - b.drum_i22;
-    let ss = (s10 * s10).v();
-    let cs = (c10 * s10).v();
+    let inertia_difference = b.drum_i11 - b.drum_i22;
+    let sin_squared = (s10 * s10).v();
+    let cos_sin = (c10 * s10).v();
     // k11 = c^2 i11 - 2 c s i12 + s^2 i22; k22 follows from the trace.
-    let rotation_term = difference * ss + 2.0 * (cs * b.drum_i12).v();
+    let rotation_term = inertia_difference * sin_squared + 2.0 * (cos_sin * b.drum_i12).v();
     let [mut k13, mut k23] = [b.drum_i13; 2];
     if SKEWED {
         k13 = c10 * b.drum_i13 - s10 * b.drum_i23;
@@ -438,7 +445,7 @@ fn drum_inertia_in_e<T: Real, const SKEWED: bool>(
         k11: b.drum_i11 - rotation_term,
         k22: b.drum_i22 + rotation_term,
         k33: b.drum_i33,
-        k12: cs * difference + b.drum_i12 * (1.0 - 2.0 * ss),
+        k12: cos_sin * inertia_difference + b.drum_i12 * (1.0 - 2.0 * sin_squared),
     }
 }
 
@@ -447,16 +454,21 @@ impl<T: Real> DrumInertia<T> {
     #[inline(always)]
     fn moment<const SKEWED: bool>(&self, omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
         let [x, y, z] = *omega;
-        let mut h = [self.k11 * x + self.k12 * y, self.k12 * x + self.k22 * y, (self.k33 * z).v()];
+        let mut angular_momentum =
+            [self.k11 * x + self.k12 * y, self.k12 * x + self.k22 * y, (self.k33 * z).v()];
         if SKEWED {
-            h[0] += self.k13 * z;
-            h[1] += self.k23 * z;
-            h[2] = h[2] + self.k13 * x + self.k23 * y;
+            angular_momentum[0] += self.k13 * z;
+            angular_momentum[1] += self.k23 * z;
+            angular_momentum[2] = angular_momentum[2] + self.k13 * x + self.k23 * y;
         }
         let mut moment = [
-            self.k11 * alpha[0] + self.k12 * alpha[1] + (y * h[2] - z * h[1]),
-            self.k12 * alpha[0] + self.k22 * alpha[1] + (z * h[0] - x * h[2]),
-            self.k33 * alpha[2] + (x * h[1] - y * h[0]),
+            self.k11 * alpha[0]
+                + self.k12 * alpha[1]
+                + (y * angular_momentum[2] - z * angular_momentum[1]),
+            self.k12 * alpha[0]
+                + self.k22 * alpha[1]
+                + (z * angular_momentum[0] - x * angular_momentum[2]),
+            self.k33 * alpha[2] + (x * angular_momentum[1] - y * angular_momentum[0]),
         ];
         if SKEWED {
             moment[0] += self.k13 * alpha[2];
@@ -479,12 +491,12 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     (s9, c9): (N<T>, N<T>),
 ) -> [[N<T>; 4]; 4] {
     // The matrix L: the drum's inertia K transformed by q9 to axes S.
-    let ss = (s9 * s9).v();
-    let difference = k.k33 - k.k11;
+    let sin_squared = (s9 * s9).v();
+    let inertia_difference = k.k33 - k.k11;
     let mut l12 = (c9 * k.k12).v();
     let mut l23 = -(s9 * k.k12).v();
-    let mut l11 = k.k11 + ss * difference;
-    let mut l33 = k.k33 - ss * difference;
+    let mut l11 = k.k11 + sin_squared * inertia_difference;
+    let mut l33 = k.k33 - sin_squared * inertia_difference;
     if SKEWED {
         l12 += s9 * k.k23;
         l23 += c9 * k.k23;
@@ -495,13 +507,13 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     let mu_rho = scale(b.mu_l, *rho_s);
 
     // The matrix J: the whole rotor's inertia in axes S; then its entries in axes A (suffix `_a`).
-    let transverse = 2.0 * mu_rho[0] + b.mu_l2;
+    let transverse_inertia = 2.0 * mu_rho[0] + b.mu_l2;
     let j11 = l11 + b.shaft_i11;
-    let j22 = k.k22 + b.shaft_i22 + transverse;
-    let j33 = l33 + b.shaft_i33 + transverse;
-    let mut l13 = (c9 * s9) * difference - mu_rho[2];
+    let j22 = k.k22 + b.shaft_i22 + transverse_inertia;
+    let j33 = l33 + b.shaft_i33 + transverse_inertia;
+    let mut l13 = (c9 * s9) * inertia_difference - mu_rho[2];
     if SKEWED {
-        l13 += (1.0 - 2.0 * ss) * k.k13;
+        l13 += (1.0 - 2.0 * sin_squared) * k.k13;
     }
     let [_, j12, j13] = from_shaft_axes(spin, &[j11, l12 - mu_rho[1], l13]);
     let half_sum = (0.5 * (j22 + j33)).v();

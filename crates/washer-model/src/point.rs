@@ -12,9 +12,9 @@ use crate::linear::outputs::{LinearOutputs, OutputLinearisation};
 use crate::linear::{LinearModel, Linearisation, tub_tangents};
 use crate::machine::feet::Feet;
 use crate::machine::spin::{SpinSegment, SpinState, segment_index};
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::equilibrium;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates};
+use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates};
 use crate::point::ringing::{Jumps, Ringing};
 use crate::{
     COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing, UnresolvedModes,
@@ -73,7 +73,7 @@ impl NoEquilibrium {
 /// A machine and its spin, prepared for the integration of either model.
 #[derive(Clone, Debug)]
 pub struct Point {
-    pub(crate) machine: Coefficients<f64>,
+    pub(crate) machine: MachineCoefficients<f64>,
     pub(crate) equilibrium: [f64; COORDINATES],
     /// The channels at the equilibrium (m, rad).
     pub(crate) channels_at_rest: [f64; CHANNELS],
@@ -121,7 +121,7 @@ impl Point {
     /// have free lengths.
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
-        -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
+        -(self.machine.bodies.tub_centre_x * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
     /// Returns a bound on the swing of unresolved modes after all jumps of the drum's acceleration.
@@ -264,16 +264,16 @@ impl Kernel for PreparationKernel<'_> {
         let mut planned_spins = self.planned_spins.into_iter();
         for group in self.points.chunks(T::LANES) {
             let mut machines: Vec<_> =
-                group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
+                group.iter().map(|(machine, _)| MachineCoefficients::new(machine)).collect();
             let lanes = copy_to_lanes(zero, &machines);
             let (q, solved_lanes) =
-                zero.0.run_out_of_line(equilibrium::SolveEquilibrium { zero, machine: &lanes });
+                zero.0.run_out_of_line(equilibrium::EquilibriumSolution { zero, machine: &lanes });
             for (lane, machine) in machines.iter_mut().enumerate() {
                 machine.elements.centre_free_strokes(&q.map(|q| q.0.get(lane)));
             }
             let steepest_tangents = steepest_tangents(&machines, &q);
             let viscous_machines: Vec<_> =
-                machines.iter().map(Coefficients::with_viscous_friction).collect();
+                machines.iter().map(MachineCoefficients::with_viscous_friction).collect();
             let linear = zero.0.run_out_of_line(Linearisation {
                 machine: &copy_to_lanes(zero, &viscous_machines),
                 q: &q,
@@ -283,7 +283,7 @@ impl Kernel for PreparationKernel<'_> {
             let zeros = [zero; COORDINATES];
             let rest_coordinates = MovingCoordinates { q, u: zeros, a: zeros };
             let spin_at_rest = SpinState::new((zero, zero.lit(1.0)), zero, zero);
-            let rest_channels = Axes::new(&spin_at_rest, &rest_coordinates)
+            let rest_channels = BodyAxes::new(&spin_at_rest, &rest_coordinates)
                 .channels(&lanes.bodies, &rest_coordinates);
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest_tangents));
             let inputs = zip(group, planned_spins.by_ref());
@@ -326,8 +326,11 @@ impl Kernel for PreparationKernel<'_> {
 
 /// Copies machines into lanes, and the first machine also into the remaining lanes.
 #[inline(always)]
-fn copy_to_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
-    let mut lanes = Coefficients::splat(zero, &machines[0]);
+fn copy_to_lanes<T: Lane>(
+    zero: N<T>,
+    machines: &[MachineCoefficients<f64>],
+) -> MachineCoefficients<T> {
+    let mut lanes = MachineCoefficients::splat(zero, &machines[0]);
     for (lane, machine) in machines.iter().enumerate() {
         lanes.set_lane(lane, machine);
     }
@@ -337,13 +340,13 @@ fn copy_to_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coeffic
 /// Computes the stiffness and the damping of each machine's tub with the steepest tangents of all
 /// elements, at equilibria `q`; `None` if these are the tangents at equilibrium.
 fn steepest_tangents<T: Lane>(
-    machines: &[Coefficients<f64>],
+    machines: &[MachineCoefficients<f64>],
     q: &[N<T>; COORDINATES],
 ) -> Vec<Option<[[[N<f64>; 4]; 4]; 2]>> {
-    let tangents = |(lane, machine): (usize, &Coefficients<f64>)| {
+    let tangents = |(lane, machine): (usize, &MachineCoefficients<f64>)| {
         let q = q.map(|q| q.0.get(lane));
         let elements = machine.elements.with_steepest_tangents(&q)?;
-        Some(tub_tangents(&Coefficients { elements, bodies: machine.bodies }, &q.map(N)))
+        Some(tub_tangents(&MachineCoefficients { elements, bodies: machine.bodies }, &q.map(N)))
     };
     machines.iter().enumerate().map(tangents).collect()
 }

@@ -272,7 +272,7 @@ pub fn prepare(
     };
     let mut point_searches: Vec<PointSearch> =
         prepared_points.iter().enumerate().filter_map(to_point_search).collect();
-    let recorders = Recorders::gauge(Gauge::DamperSpeed);
+    let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     for _ in 0..MAX_RUNS {
         let mut unfinished_searches: Vec<&mut PointSearch> =
             point_searches.iter_mut().filter(|point_search| !point_search.is_finished).collect();
@@ -290,7 +290,7 @@ pub fn prepare(
             let (_, gauge_readings) =
                 simulate_with(simd, ModelKind::Linear, &method, &batch_points, recorders);
             for (point_search, reading) in batch.iter_mut().zip(gauge_readings) {
-                point_search.update(reading.gauge(Gauge::DamperSpeed));
+                point_search.update(reading.gauge_values(Gauge::DamperSpeed));
             }
         }
     }

@@ -56,9 +56,9 @@ pub struct Record {
     /// The least gap between drum and tub over the whole run (m).
     pub min_gap_m: f64,
     /// The number of accepted steps.
-    pub steps: u64,
+    pub accepted_steps: u64,
     /// The number of steps that an adaptive method rejected.
-    pub rejected: u64,
+    pub rejected_steps: u64,
 }
 
 /// Integrates one model at every point and records peaks. The result of a point depends neither on
@@ -136,17 +136,17 @@ const EMPTY_RECORD: Record = Record {
     failure: None,
     amplitudes: [f64::NAN; CHANNELS],
     min_gap_m: f64::NAN,
-    steps: 0,
-    rejected: 0,
+    accepted_steps: 0,
+    rejected_steps: 0,
 };
 
 /// The trajectory in a lane.
 #[derive(Clone, Copy, Default)]
 struct LaneState {
     /// The index of the point.
-    point: usize,
+    point_index: usize,
     /// The index of the current segment.
-    segment: usize,
+    segment_index: usize,
     /// The steps up to the current segment.
     step_count: StepCount,
 }
@@ -160,7 +160,7 @@ struct SimulationTask<'a, T, M> {
     started_count: usize,
     /// The number of points that have ended.
     finished_count: usize,
-    lanes: [LaneState; MAX_LANES],
+    lane_states: [LaneState; MAX_LANES],
     method: &'a Method,
     channel_peaks: Peaks<T, CHANNELS>,
     /// The greatest square of the radial distance between the fronts of drum and tub.
@@ -188,36 +188,37 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
         segment_end: SegmentEnd,
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
-        let state = &mut self.lanes[lane];
+        let lane_state = &mut self.lane_states[lane];
         let mut failure = None;
         match segment_end {
             SegmentEnd::Idle => return self.start_next_point(lane, x),
-            SegmentEnd::Completed(count) => state.step_count.add(count),
+            SegmentEnd::Completed(count) => lane_state.step_count.add(count),
             SegmentEnd::Failed { reason, time_s, count } => {
-                state.step_count.add(count);
+                lane_state.step_count.add(count);
                 failure = Some((reason, time_s));
             }
         }
-        let point = self.points[state.point];
-        if let Some(checkpoints) = self.checkpoints.get_mut(state.point) {
+        let point = self.points[lane_state.point_index];
+        if let Some(checkpoints) = self.checkpoints.get_mut(lane_state.point_index) {
             let coordinates = core::array::from_fn(|i| x[i].0.get(lane));
             checkpoints.push(Checkpoint { coordinates });
         }
-        if failure.is_none() && state.segment + 1 < point.segments.len() {
-            state.segment += 1;
+        if failure.is_none() && lane_state.segment_index + 1 < point.segments.len() {
+            lane_state.segment_index += 1;
             return Some(self.start_segment(lane));
         }
         self.finished_count += 1;
-        let StepCount { accepted: steps, rejected } = state.step_count;
-        let record = &mut self.records[state.point];
-        *record = Record { failure, steps, rejected, ..EMPTY_RECORD };
+        let StepCount { accepted: accepted_steps, rejected: rejected_steps } =
+            lane_state.step_count;
+        let record = &mut self.records[lane_state.point_index];
+        *record = Record { failure, accepted_steps, rejected_steps, ..EMPTY_RECORD };
         if failure.is_none() {
             record.amplitudes = self.channel_peaks.lane_peaks(lane);
             let [radial_squared] = self.radial_peaks.lane_peaks(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
         if let Some(active_recorders) = &mut self.active_recorders {
-            active_recorders.finish(lane, state.point, point, failure.is_some());
+            active_recorders.finish(lane, lane_state.point_index, point, failure.is_some());
         }
         self.start_next_point(lane, x)
     }
@@ -307,7 +308,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
             cancel,
             started_count: 0,
             finished_count: 0,
-            lanes: [LaneState::default(); MAX_LANES],
+            lane_states: [LaneState::default(); MAX_LANES],
             method,
             channel_peaks: Peaks::new(zero),
             radial_peaks: Peaks::new(zero),
@@ -375,16 +376,16 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         self.window_indicator.0.set(lane, 0.0);
         // An idle lane has the initial state of its last point, at which the model is defined.
         let is_idle = self.started_count == self.points.len();
-        let index = if is_idle { self.lanes[lane].point } else { self.started_count };
+        let index = if is_idle { self.lane_states[lane].point_index } else { self.started_count };
         let point = self.points[index];
-        for (x, at_rest) in x.iter_mut().zip(M::at_rest(point)) {
+        for (x, at_rest) in x.iter_mut().zip(M::rest_state(point)) {
             x.0.set(lane, at_rest);
         }
         if is_idle {
             return None;
         }
         self.started_count += 1;
-        self.lanes[lane] = LaneState { point: index, ..LaneState::default() };
+        self.lane_states[lane] = LaneState { point_index: index, ..LaneState::default() };
         self.model.set_point(lane, point);
         self.channel_peaks.reset(lane);
         self.radial_peaks.reset(lane);
@@ -396,9 +397,9 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
 
     /// Starts the lane's current segment.
     fn start_segment(&mut self, lane: usize) -> Segment {
-        let state = &self.lanes[lane];
-        let point = self.points[state.point];
-        let segment = &point.segments[state.segment];
+        let lane_state = &self.lane_states[lane];
+        let point = self.points[lane_state.point_index];
+        let segment = &point.segments[lane_state.segment_index];
         self.window_indicator.0.set(lane, f64::from(u8::from(segment.is_in_window)));
         start_segment(&mut self.model, lane, self.method, point, segment)
     }

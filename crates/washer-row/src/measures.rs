@@ -151,7 +151,7 @@ impl MetricColumn {
 
     /// Returns the value from a trajectory's reading; `None` if it was not recorded.
     pub fn value(self, reading: &Reading) -> Option<f64> {
-        let mut values = reading.gauge(self.metric.gauge()?).iter().copied();
+        let mut values = reading.gauge_values(self.metric.gauge()?).iter().copied();
         match self.part {
             Some(part) => values.nth(part),
             None if self.metric.properties().worse == Worse::Less => values.reduce(f64::min),

@@ -202,7 +202,7 @@ impl DwellPeaks {
         });
         let mut max_rotation_rad = 0.0;
         attractors.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
-            let candidate = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
+            let candidate = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind_index() };
             let mut peaks = peaks.unwrap_or(candidate);
             if candidate.tub_rotation_rad() > max_rotation_rad {
                 max_rotation_rad = candidate.tub_rotation_rad();

@@ -82,7 +82,7 @@ pub fn integrate_points(
     let mut readings = readings.into_iter();
     let run = |(record, point): (&Record, &&Point)| {
         let reading = readings.next().unwrap_or_default();
-        let factor = point.friction_speed_factor(model, reading.gauge(Gauge::DamperSpeed));
+        let factor = point.friction_speed_factor(model, reading.gauge_values(Gauge::DamperSpeed));
         let mut run = LevelRun::new(record, reading, rule, point);
         run.trajectory.friction_speed_off = factor.filter(|_| record.failure.is_none());
         run
@@ -96,7 +96,7 @@ fn trajectory(
     amplitudes: &Deviations,
     rule: &RowRule,
 ) -> Trajectory {
-    let Record { failure, steps, rejected, .. } = *record;
+    let Record { failure, accepted_steps, rejected_steps, .. } = *record;
     if let Some((reason, time_s)) = failure {
         let status = match reason {
             Failure::Diverged => Status::Diverged,
@@ -105,8 +105,8 @@ fn trajectory(
         };
         return Trajectory {
             fail_time_s: Some(time_s),
-            steps,
-            rejected,
+            steps: accepted_steps,
+            rejected: rejected_steps,
             ..Trajectory::failed(status)
         };
     }
@@ -114,8 +114,8 @@ fn trajectory(
     Trajectory {
         amplitudes: rule.channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
         min_gap_m: Some(record.min_gap_m),
-        steps,
-        rejected,
+        steps: accepted_steps,
+        rejected: rejected_steps,
         metrics: metrics.collect(),
         turns: reading.turns,
         ..Trajectory::default()

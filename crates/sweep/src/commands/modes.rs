@@ -93,12 +93,12 @@ fn describe_differences(analysis: &ModeAnalysis) -> String {
     for mode in 0..modes.len().min(COMPARED_MODES) {
         // The greatest difference (%) over all speeds, with its speed.
         let greatest = |relative_difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
-            let at_speed = |k: usize| {
+            let modes_at_speeds = |k: usize| {
                 let difference =
-                    relative_difference(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
+                    relative_difference(&modes[mode].modes_at_speeds[k], exact[k][mode].as_ref()?);
                 difference.is_finite().then_some((100.0 * difference, speeds_rpm[k]))
             };
-            let all = (0..speeds_rpm.len()).filter_map(at_speed);
+            let all = (0..speeds_rpm.len()).filter_map(modes_at_speeds);
             all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
         };
         let frequency =
@@ -129,12 +129,13 @@ fn mode_table(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> String {
          rpm        +- rpm     ratio{lowest_speed:>12}\n"
     );
     for (k, mode) in modes.iter().enumerate() {
-        let start_rpm = mode.at_speed[0].frequency_rpm;
+        let start_rpm = mode.modes_at_speeds[0].frequency_rpm;
         let rows = mode.resonances.iter().map(|resonance| {
-            let swing_rpm = 0.5 * (resonance.mode.greatest_rpm - resonance.mode.least_rpm);
+            let swing_rpm =
+                0.5 * (resonance.mode.max_frequency_rpm - resonance.mode.min_frequency_rpm);
             (format!("{:.2}", resonance.speed_rpm), format!("{swing_rpm:.3}"), &resonance.mode)
         });
-        let none = ("none".to_owned(), "-".to_owned(), &mode.at_speed[0]);
+        let none = ("none".to_owned(), "-".to_owned(), &mode.modes_at_speeds[0]);
         let none = Some(none).filter(|_| mode.resonances.is_empty());
         for (resonance, swing, at) in none.into_iter().chain(rows) {
             let number = k + 1;
@@ -165,8 +166,12 @@ fn greatest_variation(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> Option<(f6
     let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
     resonant
         .flat_map(|(k, mode)| {
-            mode.at_speed.iter().zip(speeds_rpm).map(move |(at, &speed)| {
-                (0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm, k + 1, speed)
+            mode.modes_at_speeds.iter().zip(speeds_rpm).map(move |(at, &speed)| {
+                (
+                    0.5 * (at.max_frequency_rpm - at.min_frequency_rpm) / at.frequency_rpm,
+                    k + 1,
+                    speed,
+                )
             })
         })
         .filter(|(variation, ..)| variation.is_finite())

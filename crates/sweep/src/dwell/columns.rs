@@ -60,7 +60,7 @@ impl DwellRow {
     }
 
     fn kind(&self) -> Option<usize> {
-        Some(self.motion()?.kind()).filter(|kind| *kind < SETTLED_KINDS)
+        Some(self.motion()?.kind_index()).filter(|kind| *kind < SETTLED_KINDS)
     }
 
     fn period_turns(&self) -> Option<u64> {
@@ -212,7 +212,7 @@ pub(crate) fn columns(
             "1/s",
             "largest Lyapunov exponent: of a periodic motion by its Floquet multipliers, below 0; \
              null where the spectrum shows two frequencies",
-            |row| Some(row.motion()?.exponent?.per_s),
+            |row| Some(row.motion()?.exponent?.rate_per_s),
         ),
         ("exponent_error_per_s", "1/s", "its standard error", |row| {
             Some(row.motion()?.exponent?.error_per_s)

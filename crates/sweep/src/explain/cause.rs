@@ -5,7 +5,7 @@
 //! have added to the difference of the two models, and the motion without it. Tongues are the cause
 //! of a verdict if the motion without them keeps the limit.
 
-use washer_model::{History, InitialDeviation, Method, ModelKind, Point, Spin, history};
+use washer_model::{History, InitialDeviation, Method, ModelKind, Point, Spin, integrate_history};
 
 use super::profile::growth_at;
 use super::{MapResult, Passage};
@@ -52,11 +52,17 @@ pub(super) fn find_cause<'p>(
     let (position, _) = map_result.verdict.greatest?;
     let channel = map_result.channels[position].index();
     let record_history = |model| {
-        history(model, &Method::rk4(step_s), point, &InitialDeviation::default(), INSTANT_STEP_S)
+        integrate_history(
+            model,
+            &Method::rk4(step_s),
+            point,
+            &InitialDeviation::default(),
+            INSTANT_STEP_S,
+        )
     };
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(record_history);
     let channel_value =
-        |history: &History<'_>, k: usize| Some(history.instant(k)?.channels[channel]);
+        |history: &History<'_>, k: usize| Some(history.instant_outputs(k)?.channels[channel]);
     let instant_count = nonlinear.len().min(linear.len());
     let values: Option<Vec<[f64; 2]>> = (0..instant_count)
         .map(|k| Some([channel_value(&nonlinear, k)?, channel_value(&linear, k)?]))

@@ -105,7 +105,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], map_result: &MapResult) ->
         "resonance": tongue.resonance,
         "crossed": passages.iter().map(passage_json).collect::<Value>(),
         "ends_in": tongue.ending.as_ref().map(|motion| json!({
-            "kind": Attractor::KIND_NAMES[motion.kind()],
+            "kind": Attractor::KIND_NAMES[motion.kind_index()],
             "amplitudes": by_channel(map_result, &map_result.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),

@@ -57,14 +57,14 @@ impl ModesInput {
     pub(crate) fn new(
         grid: Option<&WasherGridInput>,
         point_values: &[String],
-        greatest_rpm: f64,
+        peak_rpm: f64,
     ) -> Result<Self, Diagnostics> {
         let Some(grid) = grid else {
             return Ok(Self {
                 name: "paper".to_owned(),
                 constants: Map::new(),
                 machine: Machine::paper(),
-                spin: Spin::Ramped { profile: Profile::Ramp, peak_rpm: greatest_rpm, ramp_s: 1.0 },
+                spin: Spin::Ramped { profile: Profile::Ramp, peak_rpm, ramp_s: 1.0 },
                 timing: Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 },
             });
         };
@@ -127,7 +127,7 @@ impl ModeAnalysis {
                 }
                 at_speed_json
             };
-            entry["at_speed"] = mode.at_speed.iter().enumerate().map(with_exact).collect();
+            entry["at_speed"] = mode.modes_at_speeds.iter().enumerate().map(with_exact).collect();
             entry
         });
         let mut json = json!({ "name": name, "modes": modes.collect::<Value>() });
@@ -152,7 +152,7 @@ impl ModeAnalysis {
         table.add_words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
         let mut add_column =
             |name: &str, unit: &str, description: &str, value: fn(&ModeAtSpeed) -> f64| {
-                let values = rows().map(|(k, mode)| Some(value(&modes[mode].at_speed[k])));
+                let values = rows().map(|(k, mode)| Some(value(&modes[mode].modes_at_speeds[k])));
                 table.add_numbers(name, unit, description, values);
             };
         let description = "damped natural frequency in cycles per minute, mean over a turn";
@@ -167,9 +167,9 @@ impl ModeAnalysis {
         let description = "imaginary part of the eigenvalue, mean over a turn";
         add_column("eigenvalue_im", "rad/s", description, |at| at.im_rad_per_s);
         let description = "least damped natural frequency over a turn";
-        add_column("frequency_min_rpm", "rpm", description, |at| at.least_rpm);
+        add_column("frequency_min_rpm", "rpm", description, |at| at.min_frequency_rpm);
         let description = "greatest damped natural frequency over a turn";
-        add_column("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
+        add_column("frequency_max_rpm", "rpm", description, |at| at.max_frequency_rpm);
         if let Some(exact_modes) = &self.exact_modes {
             let mut add_exact_column =
                 |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
@@ -208,7 +208,7 @@ fn find_exact_modes(
         let exact_modes = |mode: &ModeOverSpeed| {
             motions
                 .iter()
-                .find(|motion| motion.frozen_mode.shape == mode.at_speed[k].shape)
+                .find(|motion| motion.frozen_mode.shape == mode.modes_at_speeds[k].shape)
                 .copied()
         };
         Ok(modes.iter().map(exact_modes).collect())
@@ -226,10 +226,10 @@ fn mode_properties(k: usize, mode: &ModeOverSpeed) -> Value {
         "mode": k + 1,
         "name": motion.to_string(),
         "participation": {
-            "translation_vertical": motion.vertical_translation,
-            "translation_horizontal": motion.horizontal_translation,
-            "rocking_horizontal": motion.yaw,
-            "rocking_vertical": motion.pitch,
+            "translation_vertical": motion.vertical_translation_share,
+            "translation_horizontal": motion.horizontal_translation_share,
+            "rocking_horizontal": motion.yaw_share,
+            "rocking_vertical": motion.pitch_share,
         },
         "resonances": mode.resonances.iter().map(resonance).collect::<Value>(),
     })
@@ -240,8 +240,8 @@ fn mode_at_speed_json(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
     json!({
         "speed_rpm": speed_rpm,
         "frequency_rpm": mode.frequency_rpm,
-        "frequency_min_rpm": mode.least_rpm,
-        "frequency_max_rpm": mode.greatest_rpm,
+        "frequency_min_rpm": mode.min_frequency_rpm,
+        "frequency_max_rpm": mode.max_frequency_rpm,
         "damping_ratio": mode.damping_ratio,
         "eigenvalue": [mode.re_per_s, mode.im_rad_per_s],
         "shape": coordinates.collect::<serde_json::Map<_, _>>(),

@@ -69,7 +69,7 @@ fn a_saddle_is_no_attractor() {
     assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 4 }));
     let yaw_rad = motion.peaks[Channel::TubYaw.index()];
     assert!((yaw_rad / 50.05e-3 - 1.0).abs() < 5e-3, "{yaw_rad}");
-    assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0));
+    assert!(motion.exponent.is_some_and(|exponent| exponent.rate_per_s < 0.0));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn an_attractor_far_from_the_response_is_found_from_rest() {
     };
     let motion = result.attractors.iter().find(is_expected);
     let motion = motion.unwrap_or_else(|| panic!("{:?}", result.attractors));
-    assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0), "{motion:?}");
+    assert!(motion.exponent.is_some_and(|exponent| exponent.rate_per_s < 0.0), "{motion:?}");
 }
 
 /// The textbook machine ends in the periodic response that `sweep stability` finds, also at speeds

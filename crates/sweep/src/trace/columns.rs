@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lane_ode::Failure;
 use sweep_engine::Table;
-use washer_model::{COORDINATES, Channel, Forces, History, InstantOutputs, ModelKind};
+use washer_model::{COORDINATES, Channel, History, InstantOutputs, ModelKind, SuspensionForces};
 
 use super::{TraceExtras, TraceRun};
 
@@ -66,7 +66,7 @@ impl<'a> ModelColumns<'a> {
         let instants = histories
             .iter()
             .zip(counts)
-            .flat_map(|(history, &count)| (0..count).map(|k| history.instant(k)))
+            .flat_map(|(history, &count)| (0..count).map(|k| history.instant_outputs(k)))
             .collect();
         Self { model, histories, counts, instants }
     }
@@ -130,13 +130,13 @@ impl<'a> ModelColumns<'a> {
     }
 
     fn add_forces(&self, table: &mut Table) {
-        let forces: Vec<Option<Forces>> = self
+        let forces: Vec<Option<SuspensionForces>> = self
             .histories
             .iter()
             .zip(self.counts)
             .flat_map(|(history, &count)| (0..count).map(|k| history.forces(k)))
             .collect();
-        let mut add = |force: &str, description: &str, value: &dyn Fn(&Forces) -> f64| {
+        let mut add = |force: &str, description: &str, value: &dyn Fn(&SuspensionForces) -> f64| {
             let name = format!("{force}_{}_n", self.model);
             let description =
                 format!("{description}, {} model; null from where it failed", self.model);
@@ -150,7 +150,7 @@ impl<'a> ModelColumns<'a> {
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
         let axes = ["x", "y", "z"];
         for (kind, (element, force, description, components)) in
-            Forces::ELEMENT_KINDS.into_iter().enumerate()
+            SuspensionForces::ELEMENT_KINDS.into_iter().enumerate()
         {
             for k in 0..first.by_kind()[kind].len() {
                 let mut name = format!("{element}_{}_{force}", k / components + 1);
@@ -162,18 +162,20 @@ impl<'a> ModelColumns<'a> {
                 add(&name, &description, &|forces| forces.by_kind()[kind][k]);
             }
         }
-        let elements = if first.stops_n.is_empty() && first.bushings_n.is_empty() {
+        let elements = if first.stop_forces_n.is_empty() && first.bushing_forces_n.is_empty() {
             "all springs and dampers"
         } else {
             "all springs, dampers, stops and bushings"
         };
         for (k, axis) in axes.into_iter().enumerate() {
             let description = format!("force of {elements} on the cabinet along c{}", k + 1);
-            add(&format!("cabinet_force_{axis}"), &description, &|forces| forces.cabinet_n[k]);
+            add(&format!("cabinet_force_{axis}"), &description, &|forces| {
+                forces.cabinet_force_n[k]
+            });
         }
-        for k in 0..first.feet_n.len() {
+        for k in 0..first.foot_loads_n.len() {
             let description = "vertical load of the foot, negative where it would lift";
-            add(&format!("foot_{}_load", k + 1), description, &|forces| forces.feet_n[k]);
+            add(&format!("foot_{}_load", k + 1), description, &|forces| forces.foot_loads_n[k]);
         }
         if first.slip_margin_n.is_some() {
             let description = "margin of the cabinet against slipping, friction on all feet \

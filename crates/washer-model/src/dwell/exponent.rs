@@ -29,7 +29,7 @@ const PART_TURNS: usize = 32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent {
     /// The largest Lyapunov exponent (1/s).
-    pub per_s: f64,
+    pub rate_per_s: f64,
     /// The standard error (1/s), from the scatter of parts; 0 for exponents from multipliers.
     pub error_per_s: f64,
 }
@@ -37,19 +37,19 @@ pub struct Exponent {
 impl Exponent {
     /// Whether the exponent is above 0 by more than three standard errors.
     pub fn is_positive(&self) -> bool {
-        self.per_s > 3.0 * self.error_per_s
+        self.rate_per_s > 3.0 * self.error_per_s
     }
 }
 
 /// Returns the distance of two states (m, rad): the maximum over the tub's coordinates of the
 /// difference of the coordinate plus the difference of its speed divided by the drum's speed.
-pub(super) fn distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
+pub(super) fn state_distance(setup: &TurnSetup<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
     let speed_rad_per_s = setup.speed_rpm * TAU / 60.0;
-    let difference = |&i: &usize| {
+    let coordinate_difference = |&i: &usize| {
         let j = COORDINATES + i;
         (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed_rad_per_s
     };
-    TUB_COORDINATES.iter().map(difference).fold(0.0, f64::max)
+    TUB_COORDINATES.iter().map(coordinate_difference).fold(0.0, f64::max)
 }
 
 /// Returns the largest Lyapunov exponents of trajectories from `requests`: initial states, each
@@ -66,7 +66,7 @@ pub(super) fn compute_exponents(
         })
         .collect();
     // In the list, each run is followed by its perturbed run.
-    let mut pairs = Vec::with_capacity(2 * requests.len());
+    let mut run_pairs = Vec::with_capacity(2 * requests.len());
     for ((held_state, direction), initial_separations) in requests.iter().zip(&initial_separations)
     {
         let speed_rad_per_s = held_state.setup.speed_rpm * TAU / 60.0;
@@ -75,11 +75,11 @@ pub(super) fn compute_exponents(
             perturbed_state.state[COORDINATES + i] +=
                 initial_separations * speed_rad_per_s * direction[i];
         }
-        pairs.extend([*held_state, perturbed_state]);
+        run_pairs.extend([*held_state, perturbed_state]);
     }
     let mut growth_in_parts = vec![[0.0_f64; MEASUREMENT_PARTS]; requests.len()];
     for turn in 0..TRANSIENT_TURNS + MEASUREMENT_PARTS * PART_TURNS {
-        let turns = integrate_turns(simd, &pairs, 1);
+        let turns = integrate_turns(simd, &run_pairs, 1);
         for (k, initial_separations) in initial_separations.iter().enumerate() {
             let (Some(reference_turn), Some(perturbed_turn)) =
                 (turns[2 * k].first(), turns[2 * k + 1].first())
@@ -87,14 +87,14 @@ pub(super) fn compute_exponents(
                 growth_in_parts[k][0] = f64::NAN;
                 continue;
             };
-            let setup = pairs[2 * k].setup;
-            let separation = distance(&setup, &reference_turn.end, &perturbed_turn.end);
+            let setup = run_pairs[2 * k].setup;
+            let separation = state_distance(&setup, &reference_turn.end, &perturbed_turn.end);
             if let Some(measured_turn) = turn.checked_sub(TRANSIENT_TURNS) {
                 growth_in_parts[k][measured_turn / PART_TURNS] +=
                     libm::log(separation / initial_separations);
             }
-            pairs[2 * k].state = reference_turn.end;
-            pairs[2 * k + 1].state = core::array::from_fn(|i| {
+            run_pairs[2 * k].state = reference_turn.end;
+            run_pairs[2 * k + 1].state = core::array::from_fn(|i| {
                 reference_turn.end[i]
                     + (perturbed_turn.end[i] - reference_turn.end[i])
                         * (initial_separations / separation)
@@ -112,8 +112,9 @@ pub(super) fn compute_exponents(
             let standard_error =
                 (sum_of_squares / (MEASUREMENT_PARTS * (MEASUREMENT_PARTS - 1)) as f64).sqrt();
             let exponent =
-                Exponent { per_s: mean_growth / part_s, error_per_s: standard_error / part_s };
-            (exponent.per_s.is_finite() && exponent.error_per_s.is_finite()).then_some(exponent)
+                Exponent { rate_per_s: mean_growth / part_s, error_per_s: standard_error / part_s };
+            (exponent.rate_per_s.is_finite() && exponent.error_per_s.is_finite())
+                .then_some(exponent)
         });
     exponents.collect()
 }

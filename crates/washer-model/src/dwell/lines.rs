@@ -33,9 +33,9 @@ pub(super) struct SpectralLine {
     pub(super) residual: f64,
 }
 
-/// Returns the weight of sample `n` of `count` in Hann's window.
-fn hann_window(n: usize, count: usize) -> f64 {
-    let sin = libm::sin(0.5 * TAU * (n as f64 + 0.5) / count as f64);
+/// Returns the weight of sample `n` of `sample_count` in Hann's window.
+fn hann_window(n: usize, sample_count: usize) -> f64 {
+    let sin = libm::sin(0.5 * TAU * (n as f64 + 0.5) / sample_count as f64);
     sin * sin
 }
 
@@ -69,56 +69,59 @@ fn powers<const M: usize>(
     hann_weights: &[f64],
     frequencies: [f64; M],
 ) -> [f64; M] {
-    let mut powers = [0.0; M];
+    let mut total_powers = [0.0; M];
     for signal in signals {
         for (power, [re, im]) in
-            powers.iter_mut().zip(fourier_means(signal, hann_weights, frequencies))
+            total_powers.iter_mut().zip(fourier_means(signal, hann_weights, frequencies))
         {
             *power += re * re + im * im;
         }
     }
-    powers
+    total_powers
 }
 
 /// Returns the strongest line of signals of equal length, after their means are subtracted; `None`
 /// if the signals are too short or constant.
 pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> {
-    let count = signals.first()?.len();
-    let hann_weights: Vec<f64> = (0..count).map(|n| hann_window(n, count)).collect();
+    let sample_count = signals.first()?.len();
+    let hann_weights: Vec<f64> = (0..sample_count).map(|n| hann_window(n, sample_count)).collect();
     let mut residuals = signals.to_vec();
     for signal in &mut residuals {
         let [[mean, _]] = fourier_means(signal, &hann_weights, [0.0]);
         signal.iter_mut().for_each(|value| *value -= mean);
     }
     let weighted_power = |signals: &[Vec<f64>]| -> f64 {
-        let square = |signal: &Vec<f64>| -> f64 {
+        let signal_power = |signal: &Vec<f64>| -> f64 {
             signal
                 .iter()
                 .zip(&hann_weights)
                 .map(|(value, hann_weight)| hann_weight * value * value)
                 .sum()
         };
-        signals.iter().map(square).sum()
+        signals.iter().map(signal_power).sum()
     };
     let total_power = weighted_power(&residuals);
-    let frequency_at = |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * count) as f64;
+    let frequency_at =
+        |trial: usize| 0.5 * trial as f64 / (TRIALS_PER_SAMPLE * sample_count) as f64;
     // The lowest frequencies are excluded, because the mean dominates them.
-    let trials: Vec<usize> = (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * count).collect();
-    let mut strongest = (0.0, *trials.first()?);
+    let trials: Vec<usize> =
+        (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * sample_count).collect();
+    let mut strongest_power_and_trial = (0.0, *trials.first()?);
     for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
         let frequencies =
             from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
-        let powers = powers(&residuals, &hann_weights, frequencies);
-        let trial_powers = powers.into_iter().zip(trials.iter().copied());
-        strongest =
-            trial_powers.fold(
-                strongest,
-                |strongest, trial| {
-                    if trial.0 < strongest.0 { strongest } else { trial }
-                },
-            );
+        let frequency_powers = powers(&residuals, &hann_weights, frequencies);
+        let trial_powers = frequency_powers.into_iter().zip(trials.iter().copied());
+        strongest_power_and_trial =
+            trial_powers.fold(strongest_power_and_trial, |strongest_power_and_trial, trial| {
+                if trial.0 < strongest_power_and_trial.0 {
+                    strongest_power_and_trial
+                } else {
+                    trial
+                }
+            });
     }
-    let (_, strongest_trial) = strongest;
+    let (_, strongest_trial) = strongest_power_and_trial;
     let mut min_frequency = frequency_at(strongest_trial - 1);
     let mut max_frequency = frequency_at(strongest_trial + 1).min(0.5);
     for _ in 0..TERNARY_ROUNDS {
@@ -135,8 +138,9 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
         }
     }
     let frequency = 0.5 * (min_frequency + max_frequency);
-    let harmonics: Vec<Harmonic> =
-        (0..=HARMONICS).map(|k| Harmonic::new((k as f64 * frequency).fract(), count)).collect();
+    let harmonics: Vec<Harmonic> = (0..=HARMONICS)
+        .map(|k| Harmonic::new((k as f64 * frequency).fract(), sample_count))
+        .collect();
     for _ in 0..SUBTRACTION_PASSES {
         for harmonic in &harmonics {
             for signal in &mut residuals {
@@ -157,9 +161,9 @@ struct Harmonic {
 }
 
 impl Harmonic {
-    fn new(frequency: f64, count: usize) -> Self {
+    fn new(frequency: f64, sample_count: usize) -> Self {
         let phase = |n: usize| TAU * (frequency * n as f64).fract();
-        let wave = (0..count).map(phase).map(|phase| [libm::cos(phase), libm::sin(phase)]);
+        let wave = (0..sample_count).map(phase).map(|phase| [libm::cos(phase), libm::sin(phase)]);
         Self { frequency, wave: wave.collect() }
     }
 
@@ -167,8 +171,9 @@ impl Harmonic {
         let [[re, im]] = fourier_means(signal, hann_weights, [self.frequency]);
         // A real signal also has a line at the negative frequency. Both lines coincide at the
         // frequencies 0 and 0.5.
-        let distance = self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);
-        let line_count = if distance < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
+        let frequency_distance =
+            self.frequency.min((self.frequency - 0.5).abs()).min(1.0 - self.frequency);
+        let line_count = if frequency_distance < 1.0 / signal.len() as f64 { 1.0 } else { 2.0 };
         for (value, [cos, sin]) in signal.iter_mut().zip(&self.wave) {
             *value -= line_count * (re * cos - im * sin);
         }
@@ -181,16 +186,16 @@ mod tests {
 
     #[test]
     fn a_closed_curve_has_only_a_line_and_its_multiples() {
-        let signal = |f: &dyn Fn(f64) -> f64| (0..256).map(|n| f(f64::from(n))).collect();
+        let sample_signal = |f: &dyn Fn(f64) -> f64| (0..256).map(|n| f(f64::from(n))).collect();
         let frequency = 0.371_3;
-        let curve: Vec<f64> = signal(&|n| {
+        let curve_signal: Vec<f64> = sample_signal(&|n| {
             let phase = TAU * frequency * n;
             phase.cos() / (1.3 - 0.3 * phase.sin())
         });
-        let line = find_strongest_line(std::slice::from_ref(&curve)).unwrap();
+        let line = find_strongest_line(std::slice::from_ref(&curve_signal)).unwrap();
         assert!((line.frequency - frequency).abs() < 1e-6 && line.residual < 0.01, "{line:?}");
         let mut x = 0.3;
-        let noise: Vec<f64> = signal(&|_| 0.0)
+        let noise: Vec<f64> = sample_signal(&|_| 0.0)
             .into_iter()
             .map(|_: f64| {
                 x = 3.99 * x * (1.0 - x);

@@ -12,7 +12,7 @@ use lane_ode::{Cancel, N};
 pub(super) struct PeriodicOrbit<'c, 'a> {
     pub(super) held_case: &'c HeldCase<'a>,
     pub(super) held_state: HeldState<'a>,
-    pub(super) period: u32,
+    pub(super) period_turns: u32,
 }
 
 /// Returns the growth (1/s) of the fastest growing disturbance of each orbit, negative if all
@@ -23,13 +23,13 @@ pub(super) fn compute_growths_per_s(
     orbits: &[PeriodicOrbit<'_, '_>],
     cancel: Cancel<'_>,
 ) -> Vec<Option<f64>> {
-    let mut matrices: Vec<Option<StateMatrix>> = vec![None; orbits.len()];
+    let mut monodromy_matrices: Vec<Option<StateMatrix>> = vec![None; orbits.len()];
     let mut states: Vec<[f64; STATES]> =
         orbits.iter().map(|orbit| orbit.held_state.state).collect();
-    let max_period = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
-    for turn in 0..max_period {
+    let max_period_turns = orbits.iter().map(|orbit| orbit.period_turns).max().unwrap_or(0);
+    for turn in 0..max_period_turns {
         let unfinished_orbits: Vec<usize> =
-            (0..orbits.len()).filter(|&k| turn < orbits[k].period).collect();
+            (0..orbits.len()).filter(|&k| turn < orbits[k].period_turns).collect();
         let requests: Vec<TurnRequest<'_>> = unfinished_orbits
             .iter()
             .map(|&k| TurnRequest {
@@ -45,21 +45,21 @@ pub(super) fn compute_growths_per_s(
         for (k, result) in unfinished_orbits.into_iter().zip(results) {
             states[k] = result.end;
             if let Some(record) = result.record {
-                matrices[k] = Some(match &matrices[k] {
+                monodromy_matrices[k] = Some(match &monodromy_matrices[k] {
                     Some(previous) => multiply_matrices(&record.monodromy, previous),
                     None => record.monodromy,
                 });
             }
         }
     }
-    let growth = |(orbit, matrix): (&PeriodicOrbit<'_, '_>, Option<StateMatrix>)| {
+    let orbit_growth = |(orbit, matrix): (&PeriodicOrbit<'_, '_>, Option<StateMatrix>)| {
         let setup = &orbit.held_state.setup;
         let matrix = scale_speeds(&matrix?, setup.unit_per_s());
         let (multiplier, _) = leading_multiplier(orbit.held_case, &matrix)?;
-        let period_s = f64::from(orbit.period) * setup.turn_s();
+        let period_s = f64::from(orbit.period_turns) * setup.turn_s();
         Some(0.5 * libm::log(multiplier.norm_sqr()) / period_s)
     };
-    orbits.iter().zip(matrices).map(growth).collect()
+    orbits.iter().zip(monodromy_matrices).map(orbit_growth).collect()
 }
 
 fn multiply_matrices(left: &StateMatrix, right: &StateMatrix) -> StateMatrix {

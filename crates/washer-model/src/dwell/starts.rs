@@ -9,7 +9,7 @@ use crate::{COORDINATES, Modes, Point};
 /// Perturbation of a periodic response in each of the suspension's modes, as a share of its
 /// greatest coordinate. Doubling it makes trajectories leave an unstable response earlier by ln 2
 /// over the growth.
-const PERTURBATION: f64 = 1e-4;
+const PERTURBATION_SHARE: f64 = 1e-4;
 
 /// Weakest kick, relative to the hardest. Basis: kicks from 0.5 to 6 rad/s by default. Doubling it
 /// misses motions close to the response.
@@ -36,16 +36,17 @@ pub(super) fn largest_deviation(point: &Point, state: &[f64; STATES]) -> f64 {
 
 /// Returns a state that is perturbed in each of the suspension's modes.
 pub(super) fn perturb(point: &Point, frozen_modes: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
-    let size = PERTURBATION * largest_deviation(point, state);
-    let mut perturbed = *state;
+    let perturbation_size = PERTURBATION_SHARE * largest_deviation(point, state);
+    let mut perturbed_state = *state;
     for mode in &frozen_modes.modes[..SUSPENSION_MODES] {
         let max_displacement =
             TUB_COORDINATES.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
         for i in 0..COORDINATES {
-            perturbed[i] += size * round_last_digits(mode.shape[i][0] / max_displacement);
+            perturbed_state[i] +=
+                perturbation_size * round_last_digits(mode.shape[i][0] / max_displacement);
         }
     }
-    perturbed
+    perturbed_state
 }
 
 /// Returns directions of kicks: those along mode shapes, then random ones. All are combinations of
@@ -59,24 +60,24 @@ pub(super) fn kick_directions(
     frozen_modes: &Modes,
     random_count: usize,
 ) -> Directions {
-    let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
+    let mut rocking_modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
             let motion =
                 shape::dominant_motion(point, &frozen_modes.mass, &frozen_modes.modes[k].shape);
-            (k, motion.yaw + motion.pitch)
+            (k, motion.yaw_share + motion.pitch_share)
         })
         .collect();
-    modes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    rocking_modes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     // The amplitude of a mode of unit modal mass that turns the tub by 1.
-    let amplitude = |rank: usize| -> f64 {
-        let shape = &frozen_modes.modes[modes[rank].0].shape;
+    let rocking_amplitude = |rank: usize| -> f64 {
+        let shape = &frozen_modes.modes[rocking_modes[rank].0].shape;
         let yaw = shape[TUB_YAW][0];
         let pitch = shape[TUB_PITCH][0];
         1.0 / (yaw * yaw + pitch * pitch).sqrt()
     };
     let scale_shape = |rank: usize| -> [f64; COORDINATES] {
-        let shape = &frozen_modes.modes[modes[rank].0].shape;
-        core::array::from_fn(|i| round_last_digits(shape[i][0] * amplitude(rank)))
+        let shape = &frozen_modes.modes[rocking_modes[rank].0].shape;
+        core::array::from_fn(|i| round_last_digits(shape[i][0] * rocking_amplitude(rank)))
     };
     let first_scaled_shape = scale_shape(0);
     let second_scaled_shape = scale_shape(1);
@@ -85,25 +86,25 @@ pub(super) fn kick_directions(
         second_scaled_shape,
         core::array::from_fn(|i| first_scaled_shape[i] + second_scaled_shape[i]),
     ];
-    let mut numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
+    let mut random_numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
     for _ in 0..random_count {
         let components: [f64; SUSPENSION_MODES] =
-            core::array::from_fn(|_| draw_normal(&mut numbers));
+            core::array::from_fn(|_| draw_normal(&mut random_numbers));
         let length = components.iter().map(|component| component * component).sum::<f64>().sqrt();
         let velocity = |i: usize| -> f64 {
             let shapes = frozen_modes.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
             components.iter().zip(shapes).map(|(component, shape)| component * shape).sum()
         };
-        let scale = amplitude(0) / length;
-        directions.push(core::array::from_fn(|i| round_last_digits(scale * velocity(i))));
+        let velocity_scale = rocking_amplitude(0) / length;
+        directions.push(core::array::from_fn(|i| round_last_digits(velocity_scale * velocity(i))));
     }
     directions
 }
 
 /// Returns a number of the standard normal distribution (Box and Muller).
-fn draw_normal(numbers: &mut fastrand::Rng) -> f64 {
-    let radius = (-2.0 * libm::log(1.0 - numbers.f64())).sqrt();
-    radius * libm::cos(core::f64::consts::TAU * numbers.f64())
+fn draw_normal(random_numbers: &mut fastrand::Rng) -> f64 {
+    let radius = (-2.0 * libm::log(1.0 - random_numbers.f64())).sqrt();
+    radius * libm::cos(core::f64::consts::TAU * random_numbers.f64())
 }
 
 /// Returns the number of random directions among a number of kicks: every third kick has one.
@@ -120,7 +121,7 @@ pub(super) const fn is_from_rest((direction, _): Kick) -> bool {
 
 /// Returns a number of kicks up to a size (rad/s): those along mode shapes first, the hardest in
 /// all directions before weaker ones, then random ones, from the hardest to the weakest.
-pub(super) fn kicks(count: usize, max_kick_rad_per_s: f64) -> Vec<Kick> {
+pub(super) fn plan_kicks(count: usize, max_kick_rad_per_s: f64) -> Vec<Kick> {
     let random_count = random_kick_count(count);
     let mode_kick_count = count - random_count;
     let kick_size_rad_per_s = |level: usize, level_count: usize| {

@@ -4,7 +4,9 @@ use super::*;
 use crate::coordinates::{COORDINATES, TUB_YAW};
 use crate::tests::elements::machine;
 use crate::tests::reference::read_reference;
-use crate::{Channel, InitialDeviation, Method, ModelKind, Spin, Timing, history, prepare};
+use crate::{
+    Channel, InitialDeviation, Method, ModelKind, Spin, Timing, integrate_history, prepare,
+};
 use serde_json::{Value, json};
 
 const REFERENCE_CHANNELS: [(Channel, &str); 4] = [
@@ -68,16 +70,16 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
         for (reference_point, search_result) in reference_points.iter().zip(search_results) {
             let search_result = search_result.unwrap();
             let speed_rpm = reference_point["speed_rpm"].as_f64().unwrap();
-            let growth = search_result.responses[0].growth_per_s();
-            println!("{name} {speed_rpm}: growth {growth:.4}");
+            let growth_per_s = search_result.responses[0].growth_per_s();
+            println!("{name} {speed_rpm}: growth {growth_per_s:.4}");
             for motion in &search_result.attractors {
                 let ends = reference_point["ends"].as_array().unwrap();
                 let errors = ends.iter().map(|end| relative_error(motion, end));
-                let nearest = errors.fold(f64::INFINITY, f64::min);
+                let least_error = errors.fold(f64::INFINITY, f64::min);
                 let peaks =
                     REFERENCE_CHANNELS.map(|(channel, _)| 1e3 * motion.peaks[channel.index()]);
                 println!(
-                    "  {:?} {:?} {} of {} after {:.0} s {peaks:.2?} {:?} error {nearest:.1e}",
+                    "  {:?} {:?} {} of {} after {:.0} s {peaks:.2?} {:?} error {least_error:.1e}",
                     motion.status,
                     motion.motion_kind,
                     motion.starts,
@@ -107,8 +109,8 @@ fn check_motions(name: &str, speed_rpm: f64, reference_point: &Value, search_res
         let description = json!([name, speed_rpm, end]);
         // With a small growth, a perturbed start of the reference may still be near the periodic
         // response.
-        let growth = reference_point["growth_per_s"].as_f64().unwrap();
-        if growth.abs() < 0.1 && end["start"] == "disturbed" {
+        let growth_per_s = reference_point["growth_per_s"].as_f64().unwrap();
+        if growth_per_s.abs() < 0.1 && end["start"] == "disturbed" {
             continue;
         }
         if name == "paper_140" && speed_rpm == 305.0 {
@@ -165,34 +167,44 @@ fn slow_decay_is_not_taken_for_a_doubled_period() {
     let point =
         prepare_at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
-    let starts = StartRule { max_time_s: 120.0, ..StartRule::default() };
+    let start_rule = StartRule { max_time_s: 120.0, ..StartRule::default() };
     let search_result =
-        find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never).remove(0).unwrap();
+        find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
+            .remove(0)
+            .unwrap();
     assert!((-2e-3..0.0).contains(&search_result.responses[0].growth_per_s()));
     for motion in &search_result.attractors {
-        let settled = motion.motion_kind;
-        assert!(matches!(settled, None | Some(MotionKind::Periodic { turns: 1 })), "{settled:?}");
+        let motion_kind = motion.motion_kind;
+        assert!(
+            matches!(motion_kind, None | Some(MotionKind::Periodic { turns: 1 })),
+            "{motion_kind:?}"
+        );
     }
 }
 
 /// Returns a random machine, two of three with friction and one of three with stops, and a speed
 /// (rpm).
 fn random_machine(number: u64, numbers: &mut fastrand::Rng) -> (Value, f64) {
-    let kind = number % 3;
-    let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+    let machine_kind = number % 3;
+    let mut random_between = |low: f64, high: f64| low + (high - low) * numbers.f64();
     let mut keys = json!({
-        "unbalance_mass_kg": between(0.1, 0.9),
-        "damping_n_s_per_m": if kind == 0 { between(60.0, 200.0) } else { between(10.0, 40.0) },
+        "unbalance_mass_kg": random_between(0.1, 0.9),
+        "damping_n_s_per_m": if machine_kind == 0 {
+            random_between(60.0, 200.0)
+        } else {
+            random_between(10.0, 40.0)
+        },
     });
-    if kind > 0 {
-        keys["Ff"] = json!(between(20.0, 80.0));
+    if machine_kind > 0 {
+        keys["Ff"] = json!(random_between(20.0, 80.0));
     }
-    if kind > 1 {
-        let clearance = between(0.005, 0.02);
-        let side = |side: f64| [0.4, 0.0, 0.28 * side, 0.0, 0.0, side, clearance, 4e4, 100.0];
-        keys["stops"] = json!([side(1.0), side(-1.0)]);
+    if machine_kind > 1 {
+        let clearance = random_between(0.005, 0.02);
+        let stop_at_side =
+            |side: f64| [0.4, 0.0, 0.28 * side, 0.0, 0.0, side, clearance, 4e4, 100.0];
+        keys["stops"] = json!([stop_at_side(1.0), stop_at_side(-1.0)]);
     }
-    (keys, between(230.0, 330.0))
+    (keys, random_between(230.0, 330.0))
 }
 
 /// Returns the number in an environment variable, or a default.
@@ -206,22 +218,22 @@ fn number_from_env(name: &str, default: u64) -> u64 {
 #[ignore = "short steps: minutes"]
 fn random_motions_continue_unchanged_in_short_steps() {
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 35));
-    let mut counts = [0; Attractor::KIND_NAMES.len()];
+    let mut kind_counts = [0; Attractor::KIND_NAMES.len()];
     let mut max_errors = [0.0_f64; 3];
     for number in 0..number_from_env("MACHINES", 12) {
-        let kind = (number % 3) as usize;
+        let machine_kind = (number % 3) as usize;
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
         let kick_rad_per_s = 1.0 + 5.0 * numbers.f64();
         let point = prepare_at(&keys, 100.0, 1.0);
-        let starts =
+        let start_rule =
             StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let search_result =
-            find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never)
+            find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
                 .remove(0)
                 .unwrap();
         for motion in &search_result.attractors {
-            counts[motion.kind()] += 1;
+            kind_counts[motion.kind_index()] += 1;
             if matches!(motion.motion_kind, None | Some(MotionKind::Chaotic)) {
                 continue;
             }
@@ -236,17 +248,18 @@ fn random_motions_continue_unchanged_in_short_steps() {
                 "{number}: {speed_rpm:.1} rpm {:?} {:.0} s, error {error:.1e} {keys}",
                 motion.motion_kind, motion.time_s
             );
-            max_errors[kind] = max_errors[kind].max(error);
+            max_errors[machine_kind] = max_errors[machine_kind].max(error);
             if let Some(MotionKind::Periodic { turns }) = motion.motion_kind {
-                let last = states.len() - 1;
-                let yaw = |back: usize| states[last - back][TUB_YAW] - states[last][TUB_YAW];
+                let last_index = states.len() - 1;
+                let yaw_change =
+                    |back: usize| states[last_index - back][TUB_YAW] - states[last_index][TUB_YAW];
                 let yaw_rad = motion.peaks[Channel::TubYaw.index()];
-                assert!(yaw(turns as usize).abs() < 5e-3 * yaw_rad, "{number}: {motion:?}");
+                assert!(yaw_change(turns as usize).abs() < 5e-3 * yaw_rad, "{number}: {motion:?}");
             }
         }
     }
-    println!("{:?} {counts:?}, errors up to {max_errors:?}", Attractor::KIND_NAMES);
-    assert!(counts[0] > 0 && counts[1..4].iter().sum::<u32>() > 0);
+    println!("{:?} {kind_counts:?}, errors up to {max_errors:?}", Attractor::KIND_NAMES);
+    assert!(kind_counts[0] > 0 && kind_counts[1..4].iter().sum::<u32>() > 0);
     assert!(max_errors.iter().all(|error| *error < 1e-2), "{max_errors:?}");
 }
 
@@ -257,21 +270,21 @@ fn random_motions_continue_unchanged_in_short_steps() {
 #[test]
 #[ignore = "minutes"]
 fn random_kicks_end_in_motions_that_the_search_found() {
-    const FOLLOWED_S: f64 = 180.0;
+    const FOLLOWED_TIME_S: f64 = 180.0;
     let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 404));
-    let mut settled = 0;
-    let mut missed = Vec::new();
+    let mut settled_count = 0;
+    let mut missed_kicks = Vec::new();
     for number in 0..number_from_env("MACHINES", 6) {
         let (keys, speed_rpm) = random_machine(number, &mut numbers);
         let point = prepare_at(&keys, 100.0, 1.0);
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
-        let starts = StartRule::default();
+        let start_rule = StartRule::default();
         let search_result =
-            find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never)
+            find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
                 .remove(0)
                 .unwrap();
-        let case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
-        let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
+        let held_case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
+        let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
         let response =
             search_result.responses.first().map_or(state_at_rest, |response| response.start);
         let held_states: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
@@ -290,10 +303,10 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                             size_rad_per_s * arm_m * component / length;
                     }
                 }
-                HeldState { setup: case.setup, state }
+                HeldState { setup: held_case.setup, state }
             })
             .collect();
-        let turns = (FOLLOWED_S / case.setup.turn_s()) as usize;
+        let turns = (FOLLOWED_TIME_S / held_case.setup.turn_s()) as usize;
         for (kick, turn_records) in
             integrate_turns(Simd::best(), &held_states, turns).into_iter().enumerate()
         {
@@ -302,35 +315,39 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             };
             let description = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
             if turn_records.len() < turns {
-                settled += 1;
+                settled_count += 1;
                 let has_left_range =
                     |motion: &Attractor| matches!(motion.status, AttractorStatus::LeftRange { .. });
                 if !search_result.attractors.iter().any(has_left_range) {
-                    missed.push(format!("{description}: leaves the range"));
+                    missed_kicks.push(format!("{description}: leaves the range"));
                 }
                 continue;
             }
-            let (before, last) = turn_records[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
-            let before = peaks(before);
-            let last = peaks(last);
-            if !are_peaks_close(&before, &last, SETTLED_TOLERANCE) {
+            let (earlier_turns, last_turns) =
+                turn_records[turns - 2 * WINDOW_TURNS..].split_at(WINDOW_TURNS);
+            let earlier_peaks = peaks(earlier_turns);
+            let last_peaks = peaks(last_turns);
+            if !are_peaks_close(&earlier_peaks, &last_peaks, SETTLED_TOLERANCE) {
                 continue;
             }
-            settled += 1;
+            settled_count += 1;
             let is_this_motion = |motion: &Attractor| {
-                let share = match motion.motion_kind {
+                let tolerance = match motion.motion_kind {
                     Some(MotionKind::Chaotic) | None => CHAOS_TOLERANCE,
                     Some(_) => 2.0 * SETTLED_TOLERANCE,
                 };
-                are_peaks_close(&motion.peaks, &last, share)
+                are_peaks_close(&motion.peaks, &last_peaks, tolerance)
             };
             if !search_result.attractors.iter().any(is_this_motion) {
-                missed.push(format!("{description}: {last:.4?}"));
+                missed_kicks.push(format!("{description}: {last_peaks:.4?}"));
             }
         }
     }
-    println!("{settled} kicks settled, {} in no motion that was found: {missed:#?}", missed.len());
-    assert!(settled > 0 && 50 * missed.len() <= settled);
+    println!(
+        "{settled_count} kicks settled, {} in no motion that was found: {missed_kicks:#?}",
+        missed_kicks.len()
+    );
+    assert!(settled_count > 0 && 50 * missed_kicks.len() <= settled_count);
 }
 
 /// Integrates 256 further turns of a motion by plain RK4. Returns the largest deviations in the
@@ -340,27 +357,33 @@ fn continue_in_short_steps(
     speed_rpm: f64,
     motion: &Attractor,
 ) -> ([f64; CHANNELS], Vec<[f64; COORDINATES]>) {
-    const SAMPLES: usize = 128;
+    const SAMPLES_PER_TURN: usize = 128;
     const STEP_S: f64 = 2.5e-5;
     const TURNS: usize = 256;
     let turn_s = 60.0 / speed_rpm;
     let point = prepare_at(keys, speed_rpm, TURNS as f64 * turn_s);
     let equilibrium = point.equilibrium();
-    let start = InitialDeviation {
+    let initial_deviation = InitialDeviation {
         deviations: core::array::from_fn(|i| motion.end[i] - equilibrium[i]),
         speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
     };
     let method = Method::rk4(STEP_S);
-    let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s / SAMPLES as f64);
+    let history = integrate_history(
+        ModelKind::Nonlinear,
+        &method,
+        &point,
+        &initial_deviation,
+        turn_s / SAMPLES_PER_TURN as f64,
+    );
     assert!(history.failure.is_none());
     let mut peaks = [0.0_f64; CHANNELS];
     let mut states = Vec::new();
-    for k in 0..TURNS * SAMPLES {
-        let instant = history.instant(k).unwrap();
-        if k % SAMPLES == 0 {
+    for k in 0..TURNS * SAMPLES_PER_TURN {
+        let instant = history.instant_outputs(k).unwrap();
+        if k % SAMPLES_PER_TURN == 0 {
             states.push(instant.deviations);
         }
-        if k >= TURNS / 2 * SAMPLES {
+        if k >= TURNS / 2 * SAMPLES_PER_TURN {
             for (peak, value) in peaks.iter_mut().zip(instant.channels) {
                 *peak = peak.max(value.abs());
             }

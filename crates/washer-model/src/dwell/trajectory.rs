@@ -4,7 +4,7 @@
 //! multipliers show that the orbit is stable; if its spectrum has two frequencies; or if its
 //! largest Lyapunov exponent is positive.
 
-use super::exponent::distance;
+use super::exponent::state_distance;
 use super::lines::find_strongest_line;
 use super::starts::largest_deviation;
 use super::turns::{HeldState, TurnRecord};
@@ -140,14 +140,14 @@ impl<'a> HeldTrajectory<'a> {
         unstable_orbits: Vec<Vec<[f64; STATES]>>,
         max_time_s: f64,
     ) -> Self {
-        let windows =
+        let max_windows =
             (max_time_s / held_state.setup.turn_s() / WINDOW_TURNS as f64).ceil().max(2.0);
         Self {
             held_state,
             unstable_orbits,
             turns: Vec::with_capacity(2 * WINDOW_TURNS + BLOCK_TURNS),
             turn_count: 0,
-            max_turns: windows as usize * WINDOW_TURNS,
+            max_turns: max_windows as usize * WINDOW_TURNS,
             next_computation: NextComputation::Turns,
             next_exponent_turn: 0,
             exponent: None,
@@ -220,8 +220,8 @@ impl<'a> HeldTrajectory<'a> {
         self.turns.extend(turns);
         let surplus_turns = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
         self.turns.drain(..surplus_turns);
-        if let Some(last) = self.turns.last() {
-            self.held_state.state = last.end;
+        if let Some(last_turn) = self.turns.last() {
+            self.held_state.state = last_turn.end;
         }
         // Near an unstable orbit a trajectory looks settled, and needs further turns.
         if !self.is_near_unstable_orbit() {
@@ -268,8 +268,8 @@ impl<'a> HeldTrajectory<'a> {
     pub(super) fn add_growth(&mut self, period: u32, growth_per_s: Option<f64>) {
         self.next_computation = NextComputation::Turns;
         match growth_per_s {
-            Some(per_s) if per_s <= 0.0 => {
-                self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
+            Some(rate_per_s) if rate_per_s <= 0.0 => {
+                self.exponent = Some(Exponent { rate_per_s, error_per_s: 0.0 });
                 return self.mark_settled(MotionKind::Periodic { turns: period });
             }
             Some(_) => {
@@ -321,7 +321,7 @@ impl<'a> HeldTrajectory<'a> {
     }
 
     /// Returns the motion in which the trajectory ended.
-    pub(super) fn attractor(&self) -> Attractor {
+    pub(super) fn to_attractor(&self) -> Attractor {
         let turn_count = match self.motion_kind {
             Some(MotionKind::Periodic { .. }) => PERIOD_TEST_TURNS,
             Some(MotionKind::QuasiPeriodic { .. }) => WINDOW_TURNS,
@@ -332,7 +332,7 @@ impl<'a> HeldTrajectory<'a> {
             status: self.status,
             motion_kind: self.motion_kind,
             starts: 1,
-            peaks: peaks(turns),
+            peaks: largest_peaks(turns),
             min_gap_m: turns.iter().map(|turn| turn.min_gap_m).fold(f64::INFINITY, f64::min),
             exponent: self.exponent,
             least_kick_rad_per_s: None,
@@ -348,45 +348,48 @@ impl<'a> HeldTrajectory<'a> {
         let window_turns = (self.turns.len() / 2).min(WINDOW_TURNS);
         let (earlier_turns, later_turns) = self.turns.split_at(self.turns.len() - window_turns);
         self.unstable_orbits.iter().any(|orbit| {
-            let sizes =
+            let state_sizes =
                 orbit.iter().map(|state| largest_deviation(self.held_state.setup.point, state));
-            let size = sizes.fold(0.0, f64::max);
+            let orbit_size = state_sizes.fold(0.0, f64::max);
             let orbit_distance = |turn: &TurnRecord| {
-                let distances =
-                    orbit.iter().map(|state| distance(&self.held_state.setup, &turn.end, state));
-                distances.fold(f64::INFINITY, f64::min) / size
+                let distances = orbit
+                    .iter()
+                    .map(|state| state_distance(&self.held_state.setup, &turn.end, state));
+                distances.fold(f64::INFINITY, f64::min) / orbit_size
             };
             let max_distance =
                 |turns: &[TurnRecord]| turns.iter().map(orbit_distance).fold(0.0, f64::max);
-            let last = max_distance(later_turns);
-            let previous = max_distance(&earlier_turns[earlier_turns.len() - window_turns..]);
-            last < CLOSE_ORBIT_DISTANCE
-                || (last < NEAR_ORBIT_DISTANCE && last > DEPARTURE_RATIO * previous)
+            let later_distance = max_distance(later_turns);
+            let earlier_distance =
+                max_distance(&earlier_turns[earlier_turns.len() - window_turns..]);
+            later_distance < CLOSE_ORBIT_DISTANCE
+                || (later_distance < NEAR_ORBIT_DISTANCE
+                    && later_distance > DEPARTURE_RATIO * earlier_distance)
         })
     }
 
     /// Whether the largest deviations of the last turns agree with those of as many turns before.
     fn has_steady_peaks(&self, turns: usize, tolerance: f64) -> bool {
-        let Some(first) = self.turns.len().checked_sub(2 * turns) else { return false };
-        let (earlier_turns, later_turns) = self.turns[first..].split_at(turns);
-        are_peaks_close(&peaks(earlier_turns), &peaks(later_turns), tolerance)
+        let Some(first_turn) = self.turns.len().checked_sub(2 * turns) else { return false };
+        let (earlier_turns, later_turns) = self.turns[first_turn..].split_at(turns);
+        are_peaks_close(&largest_peaks(earlier_turns), &largest_peaks(later_turns), tolerance)
     }
 
     /// Returns the period (turns) of the last turns, within a tolerance as a share of the motion's
     /// size.
     fn find_period(&self, tolerance: f64) -> Option<u32> {
-        let first = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
+        let first_turn = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
         let deviation =
             |turn: &TurnRecord| largest_deviation(self.held_state.setup.point, &turn.end);
-        let size = self.turns[first..].iter().map(deviation).fold(0.0, f64::max);
-        let repeats = |period: &usize| {
-            *period <= first
-                && (first..self.turns.len()).all(|k| {
+        let motion_size = self.turns[first_turn..].iter().map(deviation).fold(0.0, f64::max);
+        let repeats_after = |period: &usize| {
+            *period <= first_turn
+                && (first_turn..self.turns.len()).all(|k| {
                     let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end);
-                    distance(&self.held_state.setup, state, earlier) < tolerance * size
+                    state_distance(&self.held_state.setup, state, earlier) < tolerance * motion_size
                 })
         };
-        (1..=MAX_PERIOD_TURNS).find(repeats).map(|period| period as u32)
+        (1..=MAX_PERIOD_TURNS).find(repeats_after).map(|period| period as u32)
     }
 
     /// Returns [`Self::find_period`], if no shorter period fits with the tolerance times
@@ -400,12 +403,12 @@ impl<'a> HeldTrajectory<'a> {
     /// between windows of whole periods are extrapolated as a geometric series.
     fn remaining_change(&self, period: u32) -> f64 {
         let window_turns = PERIOD_TEST_TURNS / 2 / period as usize * period as usize;
-        let Some(first) = self.turns.len().checked_sub(3 * window_turns) else {
+        let Some(first_turn) = self.turns.len().checked_sub(3 * window_turns) else {
             return f64::INFINITY;
         };
-        let change = |from: usize| {
+        let max_change_from = |from: usize| {
             let change_at = |k: usize| {
-                distance(
+                state_distance(
                     &self.held_state.setup,
                     &self.turns[k].end,
                     &self.turns[k + window_turns].end,
@@ -413,26 +416,27 @@ impl<'a> HeldTrajectory<'a> {
             };
             (from..from + window_turns).map(change_at).fold(0.0, f64::max)
         };
-        let previous = change(first);
-        let last = change(first + window_turns);
-        let ratio = (last / previous).min(1.0 - MIN_DECREASE);
-        last * ratio
-            / (1.0 - ratio)
+        let earlier_change = max_change_from(first_turn);
+        let later_change = max_change_from(first_turn + window_turns);
+        let change_ratio = (later_change / earlier_change).min(1.0 - MIN_DECREASE);
+        later_change * change_ratio
+            / (1.0 - change_ratio)
             / largest_deviation(self.held_state.setup.point, &self.held_state.state)
     }
 
     /// Returns a motion with two frequencies, if the residual of the spectrum of yaw and pitch once
     /// a turn is below `max_residual`.
     fn find_two_frequencies(&self, max_residual: f64) -> Option<MotionKind> {
-        let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
-        let line = find_strongest_line(&[signal(TUB_YAW), signal(TUB_PITCH)])?;
+        let state_signal =
+            |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
+        let line = find_strongest_line(&[state_signal(TUB_YAW), state_signal(TUB_PITCH)])?;
         let frequency_cpm = line.frequency * self.held_state.setup.speed_rpm;
         (line.residual < max_residual).then_some(MotionKind::QuasiPeriodic { frequency_cpm })
     }
 }
 
 /// Returns the largest deviations over turns.
-fn peaks(turns: &[TurnRecord]) -> [f64; CHANNELS] {
+fn largest_peaks(turns: &[TurnRecord]) -> [f64; CHANNELS] {
     core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
 }
 

@@ -13,7 +13,7 @@ use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::sparse::{FurtherTerms, sparse_sums};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
+use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates, RADIAL_COMPONENTS};
 use core::array::from_fn;
 use lane_ode::{Lane, N, OutOfLine, Real, Sample};
 
@@ -270,7 +270,7 @@ impl<T: Lane> OutOfLine for OutputLinearisation<'_, T> {
             for j in 0..COORDINATES {
                 let motion =
                     MovingCoordinates { q: with_derivative(q, j, 1.0), u: zeros, a: zeros };
-                let axes = Axes::new(&spin, &motion);
+                let axes = BodyAxes::new(&spin, &motion);
                 let channels = axes.channels(&dual_bodies, &motion);
                 let radial = axes.radial_position(&dual_bodies, &motion);
                 for (output, y) in channels.iter().chain(&radial).enumerate() {

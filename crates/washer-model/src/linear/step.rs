@@ -74,11 +74,12 @@ impl StepConstants<f64> {
             rotor_inverse_mass: linear.rotor_inverse_mass,
             rotor_axis: linear.rotor_axis,
             bearing_stiffness: [
-                bodies.front_stiffness + bodies.rear_stiffness,
-                bodies.front_stiffness * bodies.bearing_front
-                    + bodies.rear_stiffness * bodies.bearing_rear,
-                bodies.front_stiffness * (bodies.bearing_front * bodies.bearing_front)
-                    + bodies.rear_stiffness * (bodies.bearing_rear * bodies.bearing_rear),
+                bodies.front_bearing_stiffness + bodies.rear_bearing_stiffness,
+                bodies.front_bearing_stiffness * bodies.front_bearing_x
+                    + bodies.rear_bearing_stiffness * bodies.rear_bearing_x,
+                bodies.front_bearing_stiffness * (bodies.front_bearing_x * bodies.front_bearing_x)
+                    + bodies.rear_bearing_stiffness
+                        * (bodies.rear_bearing_x * bodies.rear_bearing_x),
             ],
             bearing_compliance: bodies.bearing_compliance(),
         };
@@ -115,7 +116,7 @@ impl<T: Lane> StepConstants<T> {
     /// derivatives from accelerations.
     #[inline(always)]
     fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
-        Deflection::linear(q, &self.tub_axis, &self.rotor_axis).as_vector()
+        Deflection::from_linear_model(q, &self.tub_axis, &self.rotor_axis).as_vector()
     }
 
     /// Computes the load of the bearings' springs on the shaft.
@@ -215,7 +216,7 @@ impl<T: Lane> RotorArrays<T> {
         }
         self.inverse_inertia = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {
-            let cap_squared = scaling.bearings_squared;
+            let cap_squared = scaling.bearing_cap_squared;
             let arms = rotor_terms::arms(&self.entries);
             let (rotor, compliance) =
                 RotorLoadResponse::new(constants, &self.inverse_inertia, &arms);

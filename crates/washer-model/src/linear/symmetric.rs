@@ -34,12 +34,12 @@ impl<T: Real> Symmetric4<T> {
         let m = &self.0;
         let zero = m[0][0].lit(0.0);
         let mut inverse = [[zero; 4]; 4];
-        let a = invert_2x2([m[0][0], m[1][0], m[1][1]]);
+        let a_inverse = invert_2x2([m[0][0], m[1][0], m[1][1]]);
         // W = B A^-1
         let mut w = [[zero; 2]; 2];
         for i in 0..2 {
             for j in 0..2 {
-                w[i][j] = m[2 + i][0] * a[j] + m[2 + i][1] * a[1 + j];
+                w[i][j] = m[2 + i][0] * a_inverse[j] + m[2 + i][1] * a_inverse[1 + j];
             }
         }
         let mut s = [m[2][2], m[3][2], m[3][3]];
@@ -48,21 +48,21 @@ impl<T: Real> Symmetric4<T> {
             s[1] -= w[1][j] * m[2][j];
             s[2] -= w[1][j] * m[3][j];
         }
-        let s = invert_2x2(s);
+        let s_inverse = invert_2x2(s);
         // Z = S^-1 W
         let mut z = [[zero; 2]; 2];
         for i in 0..2 {
             for j in 0..2 {
-                z[i][j] = s[i] * w[0][j] + s[1 + i] * w[1][j];
+                z[i][j] = s_inverse[i] * w[0][j] + s_inverse[1 + i] * w[1][j];
                 inverse[2 + i][j] = -z[i][j];
             }
         }
-        inverse[0][0] = a[0] + w[0][0] * z[0][0] + w[1][0] * z[1][0];
-        inverse[1][0] = a[1] + w[0][1] * z[0][0] + w[1][1] * z[1][0];
-        inverse[1][1] = a[2] + w[0][1] * z[0][1] + w[1][1] * z[1][1];
-        inverse[2][2] = s[0];
-        inverse[3][2] = s[1];
-        inverse[3][3] = s[2];
+        inverse[0][0] = a_inverse[0] + w[0][0] * z[0][0] + w[1][0] * z[1][0];
+        inverse[1][0] = a_inverse[1] + w[0][1] * z[0][0] + w[1][1] * z[1][0];
+        inverse[1][1] = a_inverse[2] + w[0][1] * z[0][1] + w[1][1] * z[1][1];
+        inverse[2][2] = s_inverse[0];
+        inverse[3][2] = s_inverse[1];
+        inverse[3][3] = s_inverse[2];
         Self(inverse)
     }
 }
@@ -80,15 +80,15 @@ mod tests {
 
     #[test]
     fn the_inverse_times_the_matrix_is_the_identity() {
-        let mut random = fastrand::Rng::with_seed(7);
+        let mut rng = fastrand::Rng::with_seed(7);
         for _ in 0..100 {
             // The matrix G G^T + 0.1 is positive definite and far from singular.
             let g: [[f64; 4]; 4] =
-                core::array::from_fn(|_| core::array::from_fn(|_| random.f64() - 0.5));
+                core::array::from_fn(|_| core::array::from_fn(|_| rng.f64() - 0.5));
             let matrix = Symmetric4(core::array::from_fn(|i| {
                 core::array::from_fn(|j| {
-                    let dot: f64 = (0..4).map(|k| g[i][k] * g[j][k]).sum();
-                    N(if i == j { 0.1 + dot } else { dot })
+                    let dot_product: f64 = (0..4).map(|k| g[i][k] * g[j][k]).sum();
+                    N(if i == j { 0.1 + dot_product } else { dot_product })
                 })
             }));
             let inverse = matrix.inverse();

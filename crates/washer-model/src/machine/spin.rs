@@ -96,7 +96,7 @@ pub(crate) type SpinSegment = SpinSegmentLanes<f64>;
 impl SpinSegment {
     /// Returns the segment of a drum at constant speed, with its unbalance up at time 0.
     pub(crate) fn at_constant_speed(speed_rpm: f64) -> Self {
-        Self { turns_per_s: N(speed_rpm / 60.0), ..Self::at_rest(0.0, 0.0) }
+        Self { turns_per_s: N(speed_rpm / 60.0), ..Self::standing_from(0.0, 0.0) }
     }
 
     /// Returns the acceleration at a time within the segment.
@@ -127,13 +127,13 @@ impl Spin {
                     turns_per_s2: N(peak_turns_per_s / (2.0 * ramp_s)),
                     wave_turns: N(peak_turns_per_s * ramp_s / (TAU * TAU)),
                     wave_hz: N(1.0 / ramp_s),
-                    ..SpinSegment::at_rest(0.0, 0.0)
+                    ..SpinSegment::standing_from(0.0, 0.0)
                 };
                 let ramp_turns = ramp_segment.turns_at_start.0
                     + ramp_fractional_turns(0.0, peak_turns_per_s, *ramp_s);
                 let plateau_segment = SpinSegment {
                     turns_per_s: N(peak_turns_per_s),
-                    ..SpinSegment::at_rest(*ramp_s, ramp_turns)
+                    ..SpinSegment::standing_from(*ramp_s, ramp_turns)
                 };
                 vec![ramp_segment, plateau_segment]
             }
@@ -203,7 +203,7 @@ fn linear_segments(points: &[(f64, f64)]) -> Vec<SpinSegment> {
     let mut segments = Vec::with_capacity(points.len());
     for (i, &(start_s, speed)) in points.iter().enumerate() {
         let mut segment =
-            SpinSegment { turns_per_s: N(speed), ..SpinSegment::at_rest(start_s, turns) };
+            SpinSegment { turns_per_s: N(speed), ..SpinSegment::standing_from(start_s, turns) };
         if let Some(&(end_s, end_speed)) = points.get(i + 1) {
             segment.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
             turns += ramp_fractional_turns(speed, end_speed, end_s - start_s);
@@ -215,7 +215,7 @@ fn linear_segments(points: &[(f64, f64)]) -> Vec<SpinSegment> {
 }
 
 impl SpinSegment {
-    fn at_rest(start_s: f64, turns_at_start: f64) -> Self {
+    fn standing_from(start_s: f64, turns_at_start: f64) -> Self {
         let zero = N(0.0);
         Self {
             start_s: N(start_s),

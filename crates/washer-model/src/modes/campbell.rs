@@ -47,9 +47,9 @@ pub struct ModeAtSpeed {
     /// The mean damped natural frequency (cycles per minute).
     pub frequency_rpm: f64,
     /// The least value of the damped natural frequency over the turn.
-    pub least_rpm: f64,
+    pub min_frequency_rpm: f64,
     /// The greatest value of the damped natural frequency over the turn.
-    pub greatest_rpm: f64,
+    pub max_frequency_rpm: f64,
     /// The coordinates q1 to q10 (m, rad) at theta = 0 as real and imaginary part, of unit modal
     /// mass.
     pub shape: [[f64; 2]; COORDINATES],
@@ -69,7 +69,7 @@ pub struct ModeOverSpeed {
     /// The dominant motion at the first resonance, or else at the lowest speed.
     pub motion: ModeMotion,
     /// The mode at each speed.
-    pub at_speed: Vec<ModeAtSpeed>,
+    pub modes_at_speeds: Vec<ModeAtSpeed>,
     /// The resonances in rising order.
     pub resonances: Vec<Resonance>,
 }
@@ -93,7 +93,7 @@ pub fn campbell_until(
     cancel: Cancel<'_>,
 ) -> Result<Option<Vec<ModeOverSpeed>>, ModesError> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
-    let mut modes_at_speeds = Vec::with_capacity(speeds_rpm.len());
+    let mut averages_and_modes = Vec::with_capacity(speeds_rpm.len());
     let mut current_modes = modes(point, 0.0, to_rad_per_s(lowest))?;
     for (k, &speed) in speeds_rpm.iter().enumerate() {
         if cancel.is_requested() {
@@ -104,35 +104,38 @@ pub fn campbell_until(
                 modes(point, 0.0, to_rad_per_s(rpm))
             })?;
         }
-        modes_at_speeds
+        averages_and_modes
             .push((average_over_turn(point, speed, &current_modes)?, current_modes.clone()));
     }
     let modes_over_speed = (0..COORDINATES)
         .map(|mode| {
             let mut resonances = Vec::new();
             for k in 1..speeds_rpm.len() {
-                let excess =
-                    [k - 1, k].map(|k| modes_at_speeds[k].0[mode].frequency_rpm - speeds_rpm[k]);
+                let frequency_excess =
+                    [k - 1, k].map(|k| averages_and_modes[k].0[mode].frequency_rpm - speeds_rpm[k]);
                 // An overdamped motion has no resonance, not even at standstill.
-                if (excess[0] > 0.0) != (excess[1] > 0.0) && excess[0] != 0.0 {
-                    let previous_modes = &modes_at_speeds[k - 1].1;
+                if (frequency_excess[0] > 0.0) != (frequency_excess[1] > 0.0)
+                    && frequency_excess[0] != 0.0
+                {
+                    let previous_modes = &averages_and_modes[k - 1].1;
                     let bracket_rpm = [speeds_rpm[k - 1], speeds_rpm[k]];
                     resonances.extend(find_resonance(
                         point,
                         mode,
                         previous_modes,
                         bracket_rpm,
-                        excess,
+                        frequency_excess,
                     )?);
                 }
             }
-            let at_speed: Vec<_> =
-                modes_at_speeds.iter().map(|(averages, _)| averages[mode]).collect();
-            let dominant_shape =
-                resonances.first().map_or(at_speed[0].shape, |resonance| resonance.mode.shape);
+            let modes_at_speeds: Vec<_> =
+                averages_and_modes.iter().map(|(averages, _)| averages[mode]).collect();
+            let dominant_shape = resonances
+                .first()
+                .map_or(modes_at_speeds[0].shape, |resonance| resonance.mode.shape);
             Ok(ModeOverSpeed {
-                motion: dominant_motion(point, &modes_at_speeds[0].1.mass, &dominant_shape),
-                at_speed,
+                motion: dominant_motion(point, &averages_and_modes[0].1.mass, &dominant_shape),
+                modes_at_speeds,
                 resonances,
             })
         })
@@ -145,15 +148,15 @@ fn to_rad_per_s(rpm: f64) -> f64 {
 }
 
 /// Returns the modes at the end of an interval of speeds (rpm) or of angles theta (rad), in the
-/// order of the modes `start` at the interval's start.
+/// order of the modes `start_modes` at the interval's start.
 fn follow_modes(
-    start: &Modes,
+    start_modes: &Modes,
     start_speed_or_theta: f64,
     end_speed_or_theta: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
 ) -> Result<Modes, ModesError> {
     follow_halving(
-        start,
+        start_modes,
         start_speed_or_theta,
         end_speed_or_theta,
         modes_at,
@@ -162,87 +165,94 @@ fn follow_modes(
     )
 }
 
-/// Returns the modes `end` in the order of the modes `start`, and halves the interval at most
-/// `halvings_left` times.
+/// Returns the modes `end_modes` in the order of the modes `start_modes`, and halves the interval
+/// at most `halvings_left` times.
 fn follow_halving(
-    start: &Modes,
+    start_modes: &Modes,
     start_speed_or_theta: f64,
     end_speed_or_theta: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
-    end: Modes,
+    end_modes: Modes,
     halvings_left: u32,
 ) -> Result<Modes, ModesError> {
-    let (order, assurance) = match_modes(start, &end);
+    let (mode_order, assurance) = match_modes(start_modes, &end_modes);
     if assurance >= MIN_ASSURANCE || halvings_left == 0 {
-        return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
+        return Ok(Modes { modes: mode_order.map(|k| end_modes.modes[k]), ..end_modes });
     }
     let midpoint = 0.5 * (start_speed_or_theta + end_speed_or_theta);
     let midpoint_modes = follow_halving(
-        start,
+        start_modes,
         start_speed_or_theta,
         midpoint,
         modes_at,
         modes_at(midpoint)?,
         halvings_left - 1,
     )?;
-    follow_halving(&midpoint_modes, midpoint, end_speed_or_theta, modes_at, end, halvings_left - 1)
+    follow_halving(
+        &midpoint_modes,
+        midpoint,
+        end_speed_or_theta,
+        modes_at,
+        end_modes,
+        halvings_left - 1,
+    )
 }
 
-/// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
-/// MAC of a pair. Pairs are formed in the order of falling MAC.
-fn match_modes(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
+/// Returns for each mode of `start_modes` the index of the mode of `end_modes` that continues it,
+/// and the least MAC of a pair. Pairs are formed in the order of falling MAC.
+fn match_modes(start_modes: &Modes, end_modes: &Modes) -> ([usize; COORDINATES], f64) {
     let mut pairs = Vec::with_capacity(COORDINATES * COORDINATES);
-    for (i, before) in start.modes.iter().enumerate() {
-        for (j, after) in end.modes.iter().enumerate() {
-            pairs.push((modal_assurance(&end.mass, &before.shape, &after.shape), i, j));
+    for (i, before) in start_modes.modes.iter().enumerate() {
+        for (j, after) in end_modes.modes.iter().enumerate() {
+            pairs.push((modal_assurance(&end_modes.mass, &before.shape, &after.shape), i, j));
         }
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut order = [usize::MAX; COORDINATES];
+    let mut mode_order = [usize::MAX; COORDINATES];
     let mut min_assurance = 1.0_f64;
     for (assurance, i, j) in pairs {
-        if order[i] == usize::MAX && !order.contains(&j) {
-            order[i] = j;
+        if mode_order[i] == usize::MAX && !mode_order.contains(&j) {
+            mode_order[i] = j;
             min_assurance = min_assurance.min(assurance);
         }
     }
-    (order, min_assurance)
+    (mode_order, min_assurance)
 }
 
-/// Averages every mode at a speed over a turn. `start` holds the modes at theta = 0.
+/// Averages every mode at a speed over a turn. `start_modes` holds the modes at theta = 0.
 fn average_over_turn(
     point: &Point,
     speed_rpm: f64,
-    start: &Modes,
+    start_modes: &Modes,
 ) -> Result<[ModeAtSpeed; COORDINATES], ModesError> {
-    let speed = to_rad_per_s(speed_rpm);
-    let mut modes_by_angle = vec![start.clone()];
+    let speed_rad_per_s = to_rad_per_s(speed_rpm);
+    let mut modes_by_angle = vec![start_modes.clone()];
     for k in 1..ANGLES {
-        let theta = |k: usize| TAU * k as f64 / ANGLES as f64;
-        let modes_at = |theta| modes(point, theta, speed);
+        let angle_rad = |k: usize| TAU * k as f64 / ANGLES as f64;
+        let modes_at = |angle_rad| modes(point, angle_rad, speed_rad_per_s);
         modes_by_angle.push(follow_modes(
             &modes_by_angle[k - 1],
-            theta(k - 1),
-            theta(k),
+            angle_rad(k - 1),
+            angle_rad(k),
             &modes_at,
         )?);
     }
     let to_rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
         let turn_modes = modes_by_angle.iter().map(|modes| &modes.modes[mode]);
-        let mean =
+        let mean_over_turn =
             |value: fn(&Mode) -> f64| turn_modes.clone().map(value).sum::<f64>() / ANGLES as f64;
-        let frequencies = turn_modes.clone().map(|mode| mode.im_rad_per_s);
-        let re_per_s = mean(|mode| mode.re_per_s);
-        let im_rad_per_s = mean(|mode| mode.im_rad_per_s);
+        let frequencies_rad_per_s = turn_modes.clone().map(|mode| mode.im_rad_per_s);
+        let re_per_s = mean_over_turn(|mode| mode.re_per_s);
+        let im_rad_per_s = mean_over_turn(|mode| mode.im_rad_per_s);
         ModeAtSpeed {
             re_per_s,
             im_rad_per_s,
-            damping_ratio: -re_per_s / mean(|mode| mode.magnitude_rad_per_s),
+            damping_ratio: -re_per_s / mean_over_turn(|mode| mode.magnitude_rad_per_s),
             frequency_rpm: to_rpm(im_rad_per_s),
-            least_rpm: to_rpm(frequencies.clone().fold(f64::INFINITY, f64::min)),
-            greatest_rpm: to_rpm(frequencies.fold(f64::NEG_INFINITY, f64::max)),
-            shape: start.modes[mode].shape,
+            min_frequency_rpm: to_rpm(frequencies_rad_per_s.clone().fold(f64::INFINITY, f64::min)),
+            max_frequency_rpm: to_rpm(frequencies_rad_per_s.fold(f64::NEG_INFINITY, f64::max)),
+            shape: start_modes.modes[mode].shape,
         }
     }))
 }
@@ -258,11 +268,12 @@ fn find_resonance(
     [start, end]: [f64; 2],
     [mut low_excess, mut high_excess]: [f64; 2],
 ) -> Result<Option<Resonance>, ModesError> {
-    let mut low = start;
-    let mut high = end;
+    let mut low_rpm = start;
+    let mut high_rpm = end;
     let mut last_moved_side = 0;
     for _ in 0..MAX_SEARCH_STEPS {
-        let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
+        let speed_rpm =
+            (low_rpm * high_excess - high_rpm * low_excess) / (high_excess - low_excess);
         let end_modes = follow_modes(previous_modes, start, speed_rpm, &|rpm| {
             modes(point, 0.0, to_rad_per_s(rpm))
         })?;
@@ -272,15 +283,15 @@ fn find_resonance(
         if excess.abs() < RESONANCE_TOLERANCE_RPM {
             return Ok(Some(resonance));
         }
-        if high - low < RESONANCE_TOLERANCE_RPM {
+        if high_rpm - low_rpm < RESONANCE_TOLERANCE_RPM {
             break;
         }
         if (excess > 0.0) == (high_excess > 0.0) {
-            (high, high_excess) = (speed_rpm, excess);
+            (high_rpm, high_excess) = (speed_rpm, excess);
             low_excess *= if last_moved_side == 1 { 0.5 } else { 1.0 };
             last_moved_side = 1;
         } else {
-            (low, low_excess) = (speed_rpm, excess);
+            (low_rpm, low_excess) = (speed_rpm, excess);
             high_excess *= if last_moved_side == -1 { 0.5 } else { 1.0 };
             last_moved_side = -1;
         }

@@ -44,13 +44,13 @@ pub struct ModeMotion {
     /// The plane of the movement.
     pub plane: MotionPlane,
     /// The share of the rigid translation along c2.
-    pub vertical_translation: f64,
+    pub vertical_translation_share: f64,
     /// The share of the rigid translation along c3.
-    pub horizontal_translation: f64,
+    pub horizontal_translation_share: f64,
     /// The share of the rigid rotation about c2 through the mass centre.
-    pub yaw: f64,
+    pub yaw_share: f64,
     /// The share of the rigid rotation about c3 through the mass centre.
-    pub pitch: f64,
+    pub pitch_share: f64,
 }
 
 /// Expands to the names of movements, each in every plane.
@@ -101,7 +101,7 @@ const HORIZONTAL_COORDINATES: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, 
 
 /// The coordinates of the motions as one rigid body: along c2, along c3, about c2, about c3. The
 /// drum has none, because its angles are relative to the shaft.
-const RIGID_PAIRS: [[usize; 2]; 4] =
+const RIGID_COORDINATE_PAIRS: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
 /// Returns the movement with the greatest share of a shape of unit modal mass, if that movement has
@@ -111,8 +111,9 @@ pub(crate) fn dominant_motion(
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
 ) -> ModeMotion {
-    let energy_shares = rigid_shares(mass, shape);
-    let [vertical_translation, horizontal_translation, yaw, pitch] = energy_shares;
+    let energy_shares = rigid_energy_shares(mass, shape);
+    let [vertical_translation_share, horizontal_translation_share, yaw_share, pitch_share] =
+        energy_shares;
     let movement = if energy_shares.iter().sum::<f64>() < 1.0 - MAJORITY_SHARE {
         relative_movement(point, shape)
     } else {
@@ -122,19 +123,26 @@ pub(crate) fn dominant_motion(
     for i in HORIZONTAL_COORDINATES {
         horizontal_part[i] = shape[i];
     }
-    let horizontal = mass_inner_product(mass, &horizontal_part, &horizontal_part)[0];
-    let plane = if horizontal > PLANE_SHARE {
+    let horizontal_energy_share = mass_inner_product(mass, &horizontal_part, &horizontal_part)[0];
+    let plane = if horizontal_energy_share > PLANE_SHARE {
         MotionPlane::Horizontal
-    } else if horizontal < 1.0 - PLANE_SHARE {
+    } else if horizontal_energy_share < 1.0 - PLANE_SHARE {
         MotionPlane::Vertical
     } else {
         MotionPlane::Both
     };
-    ModeMotion { movement, plane, vertical_translation, horizontal_translation, yaw, pitch }
+    ModeMotion {
+        movement,
+        plane,
+        vertical_translation_share,
+        horizontal_translation_share,
+        yaw_share,
+        pitch_share,
+    }
 }
 
 /// Returns the rigid movement that has the greatest of these shares, in the order of
-/// [`RIGID_PAIRS`], and more than half of the energy.
+/// [`RIGID_COORDINATE_PAIRS`], and more than half of the energy.
 fn rigid_movement([vertical, horizontal, yaw, pitch]: [f64; 4]) -> Movement {
     let is_translation = vertical.max(horizontal) > yaw.max(pitch);
     if is_translation && vertical + horizontal > MAJORITY_SHARE {
@@ -146,26 +154,27 @@ fn rigid_movement([vertical, horizontal, yaw, pitch]: [f64; 4]) -> Movement {
     }
 }
 
-/// Computes the shares of a shape's energy in the rigid motions, in the order of [`RIGID_PAIRS`].
-/// Rotations are made orthogonal to the translations, so that they are about the mass centre.
-fn rigid_shares(
+/// Computes the shares of a shape's energy in the rigid motions, in the order of
+/// [`RIGID_COORDINATE_PAIRS`]. Rotations are made orthogonal to the translations, so that they are
+/// about the mass centre.
+fn rigid_energy_shares(
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
 ) -> [f64; 4] {
-    let mut basis: Vec<[[f64; 2]; COORDINATES]> = Vec::with_capacity(RIGID_PAIRS.len());
-    for coordinates in RIGID_PAIRS {
-        let mut rigid = [[0.0; 2]; COORDINATES];
+    let mut basis: Vec<[[f64; 2]; COORDINATES]> = Vec::with_capacity(RIGID_COORDINATE_PAIRS.len());
+    for coordinates in RIGID_COORDINATE_PAIRS {
+        let mut rigid_vector = [[0.0; 2]; COORDINATES];
         for i in coordinates {
-            rigid[i][0] = 1.0;
+            rigid_vector[i][0] = 1.0;
         }
         for basis_vector in &basis {
-            let projection = mass_inner_product(mass, basis_vector, &rigid)[0];
+            let projection = mass_inner_product(mass, basis_vector, &rigid_vector)[0];
             for i in 0..COORDINATES {
-                rigid[i][0] -= projection * basis_vector[i][0];
+                rigid_vector[i][0] -= projection * basis_vector[i][0];
             }
         }
-        let scale = mass_inner_product(mass, &rigid, &rigid)[0].sqrt();
-        basis.push(rigid.map(|[re, _]| [re / scale, 0.0]));
+        let scale = mass_inner_product(mass, &rigid_vector, &rigid_vector)[0].sqrt();
+        basis.push(rigid_vector.map(|[re, _]| [re / scale, 0.0]));
     }
     core::array::from_fn(|k| {
         let [re, im] = mass_inner_product(mass, &basis[k], shape);
@@ -177,22 +186,24 @@ fn rigid_shares(
 /// flexure, translation or tilt in the bearings.
 fn relative_movement(point: &Point, shape: &[[f64; 2]; COORDINATES]) -> Movement {
     let bodies = &point.machine.bodies;
-    let squared = |i: usize| shape[i][0].powi(2) + shape[i][1].powi(2);
+    let squared_amplitude = |i: usize| shape[i][0].powi(2) + shape[i][1].powi(2);
     let squared_difference = |i: usize, j: usize| {
         (shape[i][0] - shape[j][0]).powi(2) + (shape[i][1] - shape[j][1]).powi(2)
     };
-    let bending = bodies.flexure_stiffness.0 * (squared(HINGE_YAW) + squared(HINGE_PITCH));
-    let front = bodies.front_stiffness.0;
-    let rear = bodies.rear_stiffness.0;
-    let offset = squared_difference(SHAFT_Y, TUB_Y) + squared_difference(SHAFT_Z, TUB_Z);
-    let translation = (front + rear) * offset;
-    let tilt_stiffness =
-        front * bodies.bearing_front.0.powi(2) + rear * bodies.bearing_rear.0.powi(2);
-    let tilt = squared_difference(SHAFT_YAW, TUB_YAW) + squared_difference(SHAFT_PITCH, TUB_PITCH);
-    let tilting = tilt_stiffness * tilt;
-    if bending > translation.max(tilting) {
+    let bending_energy = bodies.flexure_stiffness.0
+        * (squared_amplitude(HINGE_YAW) + squared_amplitude(HINGE_PITCH));
+    let front_stiffness = bodies.front_bearing_stiffness.0;
+    let rear_stiffness = bodies.rear_bearing_stiffness.0;
+    let squared_offset = squared_difference(SHAFT_Y, TUB_Y) + squared_difference(SHAFT_Z, TUB_Z);
+    let translation_energy = (front_stiffness + rear_stiffness) * squared_offset;
+    let tilt_stiffness = front_stiffness * bodies.front_bearing_x.0.powi(2)
+        + rear_stiffness * bodies.rear_bearing_x.0.powi(2);
+    let squared_tilt =
+        squared_difference(SHAFT_YAW, TUB_YAW) + squared_difference(SHAFT_PITCH, TUB_PITCH);
+    let tilting_energy = tilt_stiffness * squared_tilt;
+    if bending_energy > translation_energy.max(tilting_energy) {
         Movement::Bending
-    } else if translation > tilting {
+    } else if translation_energy > tilting_energy {
         Movement::BearingTranslation
     } else {
         Movement::BearingTilt
@@ -224,21 +235,24 @@ mod tests {
     /// seed is printed.
     #[test]
     fn names_of_random_machines_follow_the_shares() {
-        let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
-        let seed = std::env::var("SEED").map_or(clock.as_secs(), |text| text.parse().unwrap());
+        let time_since_epoch =
+            std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
+        let seed =
+            std::env::var("SEED").map_or(time_since_epoch.as_secs(), |text| text.parse().unwrap());
         println!("SEED={seed}");
         let mut numbers = fastrand::Rng::with_seed(seed);
-        let mut translations = 0;
-        let mut rockings = 0;
-        let mut mixed = 0;
+        let mut translation_count = 0;
+        let mut rocking_count = 0;
+        let mut mixed_count = 0;
         for _ in 0..40 {
             let mut machine = crate::Machine::paper();
-            let mut factor = || 0.4 * 6.0_f64.powf(numbers.f64());
-            machine.tub.mass_kg *= factor();
-            machine.tub.centre_x_m *= factor();
-            machine.tub.inertia_kg_m2 = machine.tub.inertia_kg_m2.map(|moment| moment * factor());
+            let mut random_factor = || 0.4 * 6.0_f64.powf(numbers.f64());
+            machine.tub.mass_kg *= random_factor();
+            machine.tub.centre_x_m *= random_factor();
+            machine.tub.inertia_kg_m2 =
+                machine.tub.inertia_kg_m2.map(|moment| moment * random_factor());
             for spring in &mut machine.springs {
-                spring.stiffness_n_per_m *= factor();
+                spring.stiffness_n_per_m *= random_factor();
             }
             let spin = crate::Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
             let timing = crate::Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
@@ -247,26 +261,30 @@ mod tests {
             let modes = crate::modes::modes(&point, 0.0, 10.0).unwrap();
             for mode in &modes.modes[..4] {
                 let motion = dominant_motion(&point, &modes.mass, &mode.shape);
-                let translation = motion.vertical_translation.max(motion.horizontal_translation);
-                let rocking = motion.yaw.max(motion.pitch);
+                let translation_share =
+                    motion.vertical_translation_share.max(motion.horizontal_translation_share);
+                let rocking_share = motion.yaw_share.max(motion.pitch_share);
                 match motion.movement {
                     Movement::Translation => {
-                        assert!(translation > rocking, "{motion:?}");
-                        translations += 1;
+                        assert!(translation_share > rocking_share, "{motion:?}");
+                        translation_count += 1;
                     }
                     Movement::Rocking => {
-                        assert!(rocking >= translation, "{motion:?}");
-                        rockings += 1;
+                        assert!(rocking_share >= translation_share, "{motion:?}");
+                        rocking_count += 1;
                     }
                     Movement::Mixed => {
-                        assert!(translation.max(rocking) <= MAJORITY_SHARE, "{motion:?}");
-                        mixed += 1;
+                        assert!(
+                            translation_share.max(rocking_share) <= MAJORITY_SHARE,
+                            "{motion:?}"
+                        );
+                        mixed_count += 1;
                     }
                     _ => {}
                 }
             }
         }
-        println!("{translations} translations, {rockings} rockings, {mixed} mixed");
-        assert!(translations > 0 && rockings > 0);
+        println!("{translation_count} translations, {rocking_count} rockings, {mixed_count} mixed");
+        assert!(translation_count > 0 && rocking_count > 0);
     }
 }

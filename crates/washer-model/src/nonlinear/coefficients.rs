@@ -8,10 +8,10 @@ use lane_ode::{Lane, N};
 lane_struct! {
     /// The coefficients of a machine.
     #[derive(Clone, Debug)]
-    Coefficients { bodies: Bodies<T>, elements: Elements<T> }
+    MachineCoefficients { bodies: Bodies<T>, elements: Elements<T> }
 }
 
-impl Coefficients<f64> {
+impl MachineCoefficients<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
     }
@@ -28,7 +28,7 @@ lane_struct! {
     #[derive(Clone, Copy, Debug)]
     Bodies {
         gravity: N<T>,
-        tub_mass: N<T>, tub_inverse_mass: N<T>, tub_centre: N<T>, tub_i11: N<T>, tub_i22: N<T>,
+        tub_mass: N<T>, tub_inverse_mass: N<T>, tub_centre_x: N<T>, tub_i11: N<T>, tub_i22: N<T>,
         tub_i33: N<T>,
         shaft_i11: N<T>, shaft_i22: N<T>, shaft_i33: N<T>,
         /// The mass of shaft, drum and unbalance.
@@ -54,11 +54,12 @@ lane_struct! {
         /// `drum_i13` and `drum_i23` are zero, and the equations skip their terms.
         is_skewed: AnyLaneFlag<T>,
         flexure_stiffness: N<T>,
-        bearing_front: N<T>, bearing_rear: N<T>, front_stiffness: N<T>, rear_stiffness: N<T>,
+        front_bearing_x: N<T>, rear_bearing_x: N<T>,
+        front_bearing_stiffness: N<T>, rear_bearing_stiffness: N<T>,
         /// The inverse of the bearings' stiffness matrix over (offset, tilt) of their midpoint.
-        bearing_force_compliance: N<T>, bearing_mixed_compliance: N<T>,
+        bearing_force_compliance: N<T>, bearing_cross_compliance: N<T>,
         bearing_moment_compliance: N<T>,
-        tub_front: N<T>, drum_hinge: N<T>, hinge_to_front: N<T>, clearance: N<T>,
+        tub_front_x: N<T>, hinge_x: N<T>, hinge_to_front_distance: N<T>, clearance: N<T>,
     }
 }
 
@@ -69,7 +70,7 @@ impl<T: Copy> Bodies<T> {
     pub(crate) fn bearing_compliance(&self) -> [N<T>; 3] {
         [
             self.bearing_force_compliance,
-            self.bearing_mixed_compliance,
+            self.bearing_cross_compliance,
             self.bearing_moment_compliance,
         ]
     }
@@ -122,16 +123,16 @@ impl Bodies<f64> {
         let rotor_mass = m_s + m_d;
         let mu = m_s * m_d / rotor_mass;
         let l = drum.hinge_x_m - shaft.centre_x_m;
-        let front = bearings.front_x_m;
-        let rear = bearings.rear_x_m;
+        let front_x_m = bearings.front_x_m;
+        let rear_x_m = bearings.rear_x_m;
         let k_f = bearings.front_stiffness_n_per_m;
         let k_r = bearings.rear_stiffness_n_per_m;
-        let bearing_distance = front - rear;
+        let bearing_distance = front_x_m - rear_x_m;
         Self {
             gravity: N(machine.gravity_m_per_s2),
             tub_mass: N(tub.mass_kg),
             tub_inverse_mass: N(1.0 / tub.mass_kg),
-            tub_centre: N(tub.centre_x_m),
+            tub_centre_x: N(tub.centre_x_m),
             tub_i11: N(tub.inertia_kg_m2[0]),
             tub_i22: N(tub.inertia_kg_m2[1]),
             tub_i33: N(tub.inertia_kg_m2[2]),
@@ -157,22 +158,21 @@ impl Bodies<f64> {
             drum_i23: N(i23 - mu * rho_2 * rho_3),
             is_skewed: AnyLaneFlag::new(is_skewed),
             flexure_stiffness: N(flexure.stiffness_n_m_per_rad),
-            bearing_front: N(bearings.front_x_m),
-            bearing_rear: N(bearings.rear_x_m),
-            front_stiffness: N(bearings.front_stiffness_n_per_m),
-            rear_stiffness: N(bearings.rear_stiffness_n_per_m),
-            bearing_force_compliance: N(
-                (rear * rear / k_f + front * front / k_r) / (bearing_distance * bearing_distance)
-            ),
-            bearing_mixed_compliance: N(
-                (-rear / k_f - front / k_r) / (bearing_distance * bearing_distance)
+            front_bearing_x: N(bearings.front_x_m),
+            rear_bearing_x: N(bearings.rear_x_m),
+            front_bearing_stiffness: N(bearings.front_stiffness_n_per_m),
+            rear_bearing_stiffness: N(bearings.rear_stiffness_n_per_m),
+            bearing_force_compliance: N((rear_x_m * rear_x_m / k_f + front_x_m * front_x_m / k_r)
+                / (bearing_distance * bearing_distance)),
+            bearing_cross_compliance: N(
+                (-rear_x_m / k_f - front_x_m / k_r) / (bearing_distance * bearing_distance)
             ),
             bearing_moment_compliance: N(
                 (1.0 / k_f + 1.0 / k_r) / (bearing_distance * bearing_distance)
             ),
-            tub_front: N(tub.front_x_m),
-            drum_hinge: N(drum.hinge_x_m),
-            hinge_to_front: N(drum.front_x_m - drum.hinge_x_m),
+            tub_front_x: N(tub.front_x_m),
+            hinge_x: N(drum.hinge_x_m),
+            hinge_to_front_distance: N(drum.front_x_m - drum.hinge_x_m),
             clearance: N(machine.radial_clearance_m),
         }
     }

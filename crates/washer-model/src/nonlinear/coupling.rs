@@ -29,7 +29,7 @@ impl<T: Real> Deflection<T> {
     /// the rotor's axis. `q` are deviations from equilibrium, or accelerations for the second
     /// derivative of the deflection.
     #[inline(always)]
-    pub(crate) fn linear(
+    pub(crate) fn from_linear_model(
         q: &[N<T>; COORDINATES],
         tub_axis: &[[N<T>; 2]; 2],
         rotor_axis: &[[N<T>; 2]; 2],
@@ -80,9 +80,9 @@ lane_struct! {
     #[derive(Clone, Copy)]
     CapCoefficients {
         /// The square of the bearings' cap, rad^2/s^2.
-        bearings_squared,
+        bearing_cap_squared,
         /// The reciprocal square of the hinge's cap; 0 if the hinge is not capped.
-        inverse_hinge_squared,
+        inverse_hinge_cap_squared,
     }
 }
 
@@ -90,8 +90,8 @@ impl CapCoefficients<f64> {
     fn new(caps: &Caps) -> Self {
         let hinge_cap = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
         Self {
-            bearings_squared: N(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
-            inverse_hinge_squared: N(1.0 / (hinge_cap * hinge_cap)),
+            bearing_cap_squared: N(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
+            inverse_hinge_cap_squared: N(1.0 / (hinge_cap * hinge_cap)),
         }
     }
 }
@@ -100,7 +100,7 @@ lane_struct! {
     /// The deflections of bearings and hinge by weight at the static equilibrium, unbalance up.
     #[derive(Clone, Copy, Debug)]
     Sag {
-        bearings: Deflection<T>,
+        bearing_deflection: Deflection<T>,
         /// The hinge's angles q9 and q10.
         hinge_angles: [N<T>; 2],
     }
@@ -110,8 +110,8 @@ impl Sag<f64> {
     /// Computes the deflections at the equilibrium `q`.
     pub(crate) fn new(q: &[f64; COORDINATES]) -> Self {
         let q = q.map(N);
-        let bearings = Deflection::new(&q, &Tilt::tub(&q), &Tilt::shaft(&q));
-        Self { bearings, hinge_angles: [q[HINGE_YAW], q[HINGE_PITCH]] }
+        let bearing_deflection = Deflection::new(&q, &Tilt::tub(&q), &Tilt::shaft(&q));
+        Self { bearing_deflection, hinge_angles: [q[HINGE_YAW], q[HINGE_PITCH]] }
     }
 }
 
@@ -152,7 +152,7 @@ impl<T: Lane> Coupling<T> {
         [sag_9, sag_10]: [N<T>; 2],
     ) -> Option<HingeMass<T>> {
         let Self::MassScaled(scaling) = self else { return None };
-        let inertia = (scaling.inverse_hinge_squared * flexure_stiffness).v();
+        let inertia = (scaling.inverse_hinge_cap_squared * flexure_stiffness).v();
         let sag_torque = (BACKWARD_WHIRL_RATIO * (inertia * (spin.speed * spin.speed).v()).v()).v();
         Some(HingeMass {
             inertia,
@@ -175,16 +175,16 @@ impl<T: Lane> Coupling<T> {
         speed: N<T>,
         deflection: &Deflection<T>,
         sag: &Deflection<T>,
-        (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
-        (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
+        (tub, tub_factors): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
+        (rotor, rotor_factors): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     ) -> [N<T>; COORDINATES] {
         let shaft_load = match self {
             Self::Springs => deflection.load_on_shaft(bodies),
             Self::MassScaled(scaling) => {
-                let tub_response = tub.axis_response(tub_inertia);
-                let rotor_response = rotor.axis_response(rotor_inertia);
+                let tub_response = tub.axis_response(tub_factors);
+                let rotor_response = rotor.axis_response(rotor_factors);
                 let speed_squared = (speed * speed).v();
-                let squares_of_cap_and_speed = (scaling.bearings_squared, speed_squared);
+                let squares_of_cap_and_speed = (scaling.bearing_cap_squared, speed_squared);
                 mass_scaled_load(
                     bodies,
                     squares_of_cap_and_speed,
@@ -195,19 +195,19 @@ impl<T: Lane> Coupling<T> {
                 )
             }
         };
-        accelerations_under_load((tub, tub_inertia), (rotor, rotor_inertia), &shaft_load)
+        accelerations_under_load((tub, tub_factors), (rotor, rotor_factors), &shaft_load)
     }
 }
 
 /// Computes the accelerations of both halves under a bearing load on the shaft.
 #[inline(always)]
 pub(crate) fn accelerations_under_load<T: Real>(
-    (tub, tub_inertia): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
-    (rotor, rotor_inertia): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
+    (tub, tub_factors): (&FloatingChain<T, 2>, &LdltFactors<T, 2>),
+    (rotor, rotor_factors): (&FloatingChain<T, 4>, &LdltFactors<T, 4>),
     shaft_load: &AxisLoad<T>,
 ) -> [N<T>; COORDINATES] {
-    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &shaft_load.reaction());
-    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, shaft_load);
+    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_factors, &shaft_load.reaction());
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_factors, shaft_load);
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
@@ -216,21 +216,21 @@ pub(crate) fn accelerations_under_load<T: Real>(
 #[inline(always)]
 pub(crate) fn mass_scaled_system<T: Real>(
     cap_squared: N<T>,
-    [by_force, mixed, by_moment]: [N<T>; 3],
-    tub: &[[N<T>; 4]; 4],
-    rotor: &[[N<T>; 4]; 4],
+    [force_compliance, cross_compliance, moment_compliance]: [N<T>; 3],
+    tub_compliance: &[[N<T>; 4]; 4],
+    rotor_compliance: &[[N<T>; 4]; 4],
 ) -> [[N<T>; 4]; 4] {
-    let mut system_matrix = *rotor;
+    let mut system_matrix = *rotor_compliance;
     for row in 0..4 {
         for column in 0..=row {
-            system_matrix[row][column] += tub[row][column];
+            system_matrix[row][column] += tub_compliance[row][column];
         }
     }
     // K^-1 couples the force and the moment in one direction.
     for i in 0..2 {
-        system_matrix[i][i] += cap_squared * by_force;
-        system_matrix[2 + i][2 + i] += cap_squared * by_moment;
-        system_matrix[2 + i][i] += cap_squared * mixed;
+        system_matrix[i][i] += cap_squared * force_compliance;
+        system_matrix[2 + i][2 + i] += cap_squared * moment_compliance;
+        system_matrix[2 + i][i] += cap_squared * cross_compliance;
     }
     system_matrix
 }

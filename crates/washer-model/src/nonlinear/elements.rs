@@ -57,7 +57,7 @@ impl Elements<f64> {
     /// resolve the width of the corner.
     pub(crate) fn has_nonsmooth_force(&self) -> bool {
         let has_corner = |damper: &DamperCoefficients<f64>| {
-            damper.friction.0 != 0.0 || damper.has_damping_step()
+            damper.coulomb_friction.0 != 0.0 || damper.has_damping_step()
         };
         !self.stops.is_empty() || self.dampers.iter().any(has_corner)
     }
@@ -75,7 +75,7 @@ impl Elements<f64> {
     /// motion.
     pub(crate) fn linearise_friction(&mut self, damper: usize, speed_m_per_s: f64) {
         let damper = &mut self.dampers[damper];
-        damper.equivalent_damping = N(equivalent_damping(damper.friction.0, speed_m_per_s));
+        damper.equivalent_damping = N(equivalent_damping(damper.coulomb_friction.0, speed_m_per_s));
     }
 
     /// Returns the elements from which the linear model is derived: friction is replaced by
@@ -85,7 +85,7 @@ impl Elements<f64> {
         let mut elements = self.clone();
         for damper in elements.dampers.iter_mut().filter(|damper| !damper.has_free_stroke()) {
             damper.damping += damper.equivalent_damping;
-            damper.friction = N(0.0);
+            damper.coulomb_friction = N(0.0);
         }
         elements
     }
@@ -136,7 +136,7 @@ impl<T: Lane> Elements<T> {
     #[inline(always)]
     pub(crate) fn stop_depth_and_force(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[index];
-        let point = tub.point_motion(&stop.tub);
+        let point = tub.point_motion(&stop.tub_point);
         [stop.depth(&point), stop.force(&point)]
     }
 
@@ -145,7 +145,7 @@ impl<T: Lane> Elements<T> {
     pub(crate) fn damper_motion(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let ends = &self.dampers[index].ends;
         let span = compute_span(&tub.tilt, &tub.midpoint, ends);
-        let velocity = add_cross_product(&tub.velocity, &tub.angular_velocity, &ends.tub);
+        let velocity = add_cross_product(&tub.velocity, &tub.angular_velocity, &ends.tub_end);
         let length = dot(&span, &span).sqrt();
         [length, dot(&span, &velocity) / length]
     }
@@ -172,13 +172,13 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
             add_forces(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
-            let point = tub.point_motion(&stop.tub);
+            let point = tub.point_motion(&stop.tub_point);
             let force = scale(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub, &tub.tilt.rotate_to_frame(&force));
+            add_force(load, &stop.tub_point, &tub.tilt.rotate_to_frame(&force));
         }
         for bushing in &elements.bushings {
-            let force = bushing.force(&tub.point_motion(&bushing.tub));
-            add_force(load, &bushing.tub, &tub.tilt.rotate_to_frame(&force));
+            let force = bushing.force(&tub.point_motion(&bushing.tub_point));
+            add_force(load, &bushing.tub_point, &tub.tilt.rotate_to_frame(&force));
         }
     }
 }
@@ -186,17 +186,17 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
 lane_struct! {
     /// The ends of an element (m).
     #[derive(Clone, Copy, Debug)]
-    Ends {
+    ElementEnds {
         /// The cabinet end, in cabinet axes from O.
-        cabinet: [N<T>; 3],
+        cabinet_end: [N<T>; 3],
         /// The tub end, in tub axes from P_T.
-        tub: [N<T>; 3],
+        tub_end: [N<T>; 3],
     }
 }
 
-impl Ends<f64> {
+impl ElementEnds<f64> {
     fn new(cabinet_m: [f64; 3], tub_m: [f64; 3]) -> Self {
-        Self { cabinet: cabinet_m.map(N), tub: tub_m.map(N) }
+        Self { cabinet_end: cabinet_m.map(N), tub_end: tub_m.map(N) }
     }
 }
 
@@ -204,7 +204,7 @@ lane_struct! {
     /// The coefficients of a spring between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
     SpringCoefficients {
-        ends: Ends<T>,
+        ends: ElementEnds<T>,
         stiffness: N<T>,
         stiffness_times_free_length: N<T>,
         /// The cubic stiffness k_3.
@@ -217,7 +217,7 @@ impl SpringCoefficients<f64> {
     fn new(spring: &Spring) -> Self {
         let free_length_m = spring.free_length_m.unwrap_or_else(|| spring.given_length_m());
         Self {
-            ends: Ends::new(spring.cabinet_m, spring.tub_m),
+            ends: ElementEnds::new(spring.cabinet_m, spring.tub_m),
             stiffness: N(spring.stiffness_n_per_m),
             stiffness_times_free_length: N(spring.stiffness_n_per_m * free_length_m),
             cubic_stiffness: N(spring.cubic_n_per_m3),
@@ -230,10 +230,10 @@ lane_struct! {
     /// The coefficients of a damper between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
     DamperCoefficients {
-        ends: Ends<T>,
+        ends: ElementEnds<T>,
         damping: N<T>,
         /// The friction force F_f.
-        friction: N<T>,
+        coulomb_friction: N<T>,
         /// The square of the speed v_s below which friction fades.
         friction_speed_squared: N<T>,
         /// The equivalent viscous damping of the linear model (N s/m).
@@ -277,9 +277,9 @@ impl DamperCoefficients<f64> {
         let softness_m = damper.free_stroke_softness_m;
         let has_stroke = stroke_m != 0.0;
         Self {
-            ends: Ends::new(damper.cabinet_m, damper.tub_m),
+            ends: ElementEnds::new(damper.cabinet_m, damper.tub_m),
             damping: N(damper.damping_n_s_per_m),
-            friction: N(damper.friction_n),
+            coulomb_friction: N(damper.friction_n),
             friction_speed_squared: N(friction_speed_m_per_s * friction_speed_m_per_s),
             equivalent_damping: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
             outer_damping: N(damper.outer_damping_n_s_per_m),
@@ -306,14 +306,14 @@ impl<T: Real> DamperCoefficients<T> {
     /// Returns the share of friction and outer damping that acts at a length (m): a smooth step
     /// from 0 within the free stroke to 1 beyond the stroke.
     #[inline(always)]
-    fn engaged_share(&self, length: N<T>) -> N<T> {
+    fn engagement_share(&self, length: N<T>) -> N<T> {
         let elongation = length - self.rest_length;
         // The function (x^2 - s^2) / (2 s) approximates |x| - s near the ends of the stroke, and is
         // smooth at x = 0.
-        let excess =
+        let excess_stroke =
             (self.half_inverse_stroke * (elongation * elongation).v()).v() - self.half_stroke;
-        let width = (excess * excess + self.softness_squared).sqrt();
-        (0.5 * (1.0 + excess / width)).v()
+        let smoothed_excess = (excess_stroke * excess_stroke + self.softness_squared).sqrt();
+        (0.5 * (1.0 + excess_stroke / smoothed_excess)).v()
     }
 }
 
@@ -321,7 +321,7 @@ lane_struct! {
     /// The coefficients of a stop.
     #[derive(Clone, Copy, Debug)]
     StopCoefficients {
-        tub: [N<T>; 3],
+        tub_point: [N<T>; 3],
         /// The unit vector from the tub to the stop, in cabinet axes.
         direction: [N<T>; 3],
         clearance: N<T>,
@@ -335,7 +335,7 @@ impl StopCoefficients<f64> {
     fn new(stop: &BumpStop) -> Self {
         let length = stop.direction_length();
         Self {
-            tub: stop.tub_m.map(N),
+            tub_point: stop.tub_m.map(N),
             direction: stop.direction.map(|component| N(component / length)),
             clearance: N(stop.clearance_m),
             stiffness: N(stop.stiffness_n_per_m),
@@ -379,7 +379,7 @@ lane_struct! {
     /// The coefficients of a bushing.
     #[derive(Clone, Copy, Debug)]
     BushingCoefficients {
-        tub: [N<T>; 3],
+        tub_point: [N<T>; 3],
         stiffness: [N<T>; 3],
         cubic_stiffness: [N<T>; 3],
         damping: [N<T>; 3],
@@ -389,7 +389,7 @@ lane_struct! {
 impl BushingCoefficients<f64> {
     fn new(bushing: &Bushing) -> Self {
         Self {
-            tub: bushing.tub_m.map(N),
+            tub_point: bushing.tub_m.map(N),
             stiffness: bushing.stiffness_n_per_m.map(N),
             cubic_stiffness: bushing.cubic_n_per_m3.map(N),
             damping: bushing.damping_n_s_per_m.map(N),
@@ -405,8 +405,8 @@ impl<T: Real> BushingCoefficients<T> {
         for i in 0..3 {
             let d = point.displacement[i];
             let v = point.velocity[i];
-            let stiffness = self.cubic_stiffness[i] * (d * d).v() + self.stiffness[i];
-            force[i] = -(stiffness * d + self.damping[i] * v);
+            let secant_stiffness = self.cubic_stiffness[i] * (d * d).v() + self.stiffness[i];
+            force[i] = -(secant_stiffness * d + self.damping[i] * v);
         }
         force
     }
@@ -439,7 +439,7 @@ pub(crate) trait ElementLine<T> {
 /// of force is that of the line.
 pub(crate) trait ForceLaw<T> {
     /// Returns the ends of the element.
-    fn ends(&self) -> &Ends<T>;
+    fn ends(&self) -> &ElementEnds<T>;
     /// Returns the linear force along the line.
     fn force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
     /// Returns the optional force along the line: that of a cubic spring, of friction or of outer
@@ -450,7 +450,7 @@ pub(crate) trait ForceLaw<T> {
 /// The force F = -k e, and the optional force F = -k_3 e^3, with the elongation e.
 impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
     #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
+    fn ends(&self) -> &ElementEnds<T> {
         &self.ends
     }
 
@@ -470,7 +470,7 @@ impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
 /// stroke.
 impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
+    fn ends(&self) -> &ElementEnds<T> {
         &self.ends
     }
 
@@ -481,10 +481,10 @@ impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
 
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
-        let friction = line.friction_force(self.friction, self.friction_speed_squared);
+        let friction = line.friction_force(self.coulomb_friction, self.friction_speed_squared);
         if self.has_second_stage.is_set() {
             let force = friction + line.damping_force(self.outer_damping);
-            return -(self.engaged_share(line.length()) * force).v();
+            return -(self.engagement_share(line.length()) * force).v();
         }
         -friction
     }
@@ -508,7 +508,7 @@ impl<T: Real> TubMotion<T> {
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);
-        let angular_velocity = tilt.motion_at_constant_speeds(u[2], u[3]).rate;
+        let angular_velocity = tilt.motion_at_constant_speeds(u[2], u[3]).angular_velocity;
         Self::from_rate(tilt, angular_velocity, [q[0], q[1]], [u[0], u[1]])
     }
 
@@ -523,7 +523,7 @@ impl<T: Real> TubMotion<T> {
     ) -> Self {
         let velocity = [
             tilt.axis_c[1] * vy + tilt.axis_c[2] * vz,
-            tilt.second_c[1] * vy + tilt.second_c[2] * vz,
+            tilt.second_axis_c[1] * vy + tilt.second_axis_c[2] * vz,
             (tilt.cos_yaw * vz).v(),
         ];
         Self { tilt, midpoint, velocity, angular_velocity }
@@ -555,7 +555,7 @@ struct TubLine<'a, T> {
     /// The vector from the cabinet end to the tub end.
     span: Vec3<T>,
     /// The tub end.
-    end: &'a Vec3<T>,
+    tub_end: &'a Vec3<T>,
     tub: &'a TubMotion<T>,
 }
 
@@ -565,7 +565,7 @@ impl<T: Real> TubLine<'_, T> {
     fn length_times_rate(&self) -> N<T> {
         dot(
             &self.span,
-            &add_cross_product(&self.tub.velocity, &self.tub.angular_velocity, self.end),
+            &add_cross_product(&self.tub.velocity, &self.tub.angular_velocity, self.tub_end),
         )
     }
 }
@@ -598,10 +598,11 @@ impl<T: Real> ElementLine<T> for TubLine<'_, T> {
         let l_times_rate = self.length_times_rate();
         let l_squared = dot(&self.span, &self.span);
         // l sqrt(l'^2 + v_s^2), with a single square root.
-        let root = (l_squared * (l_times_rate * l_times_rate + (speed_squared * l_squared).v()))
-            .v()
-            .sqrt();
-        (force * l_times_rate).v() / root
+        let denominator = (l_squared
+            * (l_times_rate * l_times_rate + (speed_squared * l_squared).v()))
+        .v()
+        .sqrt();
+        (force * l_times_rate).v() / denominator
     }
 }
 
@@ -654,10 +655,13 @@ fn add_forces<T: Real, E: ForceLaw<T>>(
 ) {
     for element in elements {
         let ends = element.ends();
-        let line =
-            TubLine { span: compute_span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
+        let line = TubLine {
+            span: compute_span(&tub.tilt, &tub.midpoint, ends),
+            tub_end: &ends.tub_end,
+            tub,
+        };
         let force = if is_optional { element.optional_force(&line) } else { element.force(&line) };
-        add_force(load, &ends.tub, &scale(force, line.span));
+        add_force(load, &ends.tub_end, &scale(force, line.span));
     }
 }
 
@@ -675,12 +679,13 @@ fn add_force<T: Real>(
 /// Returns the vector from the cabinet end to the tub end, in tub axes. The axis t3 has no
 /// component along c2.
 #[inline(always)]
-fn compute_span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &Ends<T>) -> Vec3<T> {
-    let [x, y, z] = [ends.cabinet[0], ends.cabinet[1] - midpoint[0], ends.cabinet[2] - midpoint[1]];
-    let [t1, t2] = [&tilt.axis_c, &tilt.second_c];
+fn compute_span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &ElementEnds<T>) -> Vec3<T> {
+    let [x, y, z] =
+        [ends.cabinet_end[0], ends.cabinet_end[1] - midpoint[0], ends.cabinet_end[2] - midpoint[1]];
+    let [t1, t2] = [&tilt.axis_c, &tilt.second_axis_c];
     [
-        ends.tub[0] - t1[0] * x - t1[1] * y - t1[2] * z,
-        ends.tub[1] - t2[0] * x - t2[1] * y - t2[2] * z,
-        ends.tub[2] - tilt.sin_yaw * x - tilt.cos_yaw * z,
+        ends.tub_end[0] - t1[0] * x - t1[1] * y - t1[2] * z,
+        ends.tub_end[1] - t2[0] * x - t2[1] * y - t2[2] * z,
+        ends.tub_end[2] - tilt.sin_yaw * x - tilt.cos_yaw * z,
     ]
 }

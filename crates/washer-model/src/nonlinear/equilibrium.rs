@@ -13,7 +13,7 @@ use crate::coordinates::{
 };
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::floating::LdltFactors;
 use crate::nonlinear::{Halves, assemble_coupled_halves};
 use lane_ode::{Lane, N, OutOfLine};
@@ -31,10 +31,10 @@ const DAMPING_FACTOR: f64 = 0.6;
 /// The greatest step in any coordinate (m, rad). Basis: short against the machine, so that a soft
 /// machine does not turn over between two iterations. Doubling it halves the number of steps of
 /// machines that sag far.
-const MAX_STEP: f64 = 0.1;
+const MAX_NEWTON_STEP: f64 = 0.1;
 /// The tolerance of the last step (m, rad). Basis: Newton's method squares the error, so that only
 /// rounding remains. Doubling it changes nothing.
-const STEP_TOLERANCE: f64 = 1e-12;
+const NEWTON_STEP_TOLERANCE: f64 = 1e-12;
 /// The least shift that is added to a stiffness matrix that is not positive definite (N/m, N
 /// m/rad); the shift is raised tenfold until the sum is positive definite. Vertical springs, for
 /// example, have no stiffness sideways before they carry load. Basis: small against any
@@ -46,12 +46,12 @@ const MIN_STIFFNESS_SHIFT: f64 = 10.0;
 const MAX_STIFFNESS_SHIFT: f64 = 1e9;
 
 /// A call of [`solve_equilibrium`] that is not inlined into kernels.
-pub(crate) struct SolveEquilibrium<'a, T> {
+pub(crate) struct EquilibriumSolution<'a, T> {
     pub(crate) zero: N<T>,
-    pub(crate) machine: &'a Coefficients<T>,
+    pub(crate) machine: &'a MachineCoefficients<T>,
 }
 
-impl<T: Lane> OutOfLine for SolveEquilibrium<'_, T> {
+impl<T: Lane> OutOfLine for EquilibriumSolution<'_, T> {
     type Output = ([N<T>; COORDINATES], u32);
 
     #[inline(always)]
@@ -65,7 +65,7 @@ impl<T: Lane> OutOfLine for SolveEquilibrium<'_, T> {
 #[inline(always)]
 pub(crate) fn solve_equilibrium<T: Lane>(
     zero: N<T>,
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
 ) -> ([N<T>; COORDINATES], u32) {
     let one = zero.lit(1.0);
     let machine = machine.constant();
@@ -86,15 +86,21 @@ pub(crate) fn solve_equilibrium<T: Lane>(
         }
         let factors = LdltFactors::new(stiffness);
         let stable_lanes = factors.positive_definite_lanes();
-        let step = factors.solve(force);
+        let newton_step = factors.solve(force);
         let mut largest_step = zero;
-        for component in &step {
+        for component in &newton_step {
             largest_step = N(component.0.abs().larger(largest_step.0));
         }
-        let scale =
-            largest_step.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / largest_step);
-        let scale =
-            if iteration < FIRST_DAMPED_ITERATION { scale } else { (scale * DAMPING_FACTOR).v() };
+        let step_factor = largest_step.where_less(
+            zero.lit(MAX_NEWTON_STEP),
+            one,
+            zero.lit(MAX_NEWTON_STEP) / largest_step,
+        );
+        let step_factor = if iteration < FIRST_DAMPED_ITERATION {
+            step_factor
+        } else {
+            (step_factor * DAMPING_FACTOR).v()
+        };
         let unfinished_lanes = !(solved_lanes | unsolvable_lanes);
         for lane in (0..T::LANES).filter(|lane| unfinished_lanes >> lane & 1 == 1) {
             let current_shift = stiffness_shift.0.get(lane);
@@ -105,10 +111,13 @@ pub(crate) fn solve_equilibrium<T: Lane>(
                 continue;
             }
             for i in 0..COORDINATES {
-                q[i].0.set(lane, q[i].0.get(lane) + scale.0.get(lane) * step[i].0.get(lane));
+                q[i].0.set(
+                    lane,
+                    q[i].0.get(lane) + step_factor.0.get(lane) * newton_step[i].0.get(lane),
+                );
             }
             solved_lanes |=
-                u32::from(current_shift == 0.0 && largest_step < STEP_TOLERANCE) << lane;
+                u32::from(current_shift == 0.0 && largest_step < NEWTON_STEP_TOLERANCE) << lane;
             stiffness_shift.0.set(
                 lane,
                 if current_shift > MIN_STIFFNESS_SHIFT { 0.1 * current_shift } else { 0.0 },
@@ -135,34 +144,36 @@ const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
 /// rotation.
 #[inline(never)]
 pub(crate) fn unstable_motion(
-    machine: &Coefficients<f64>,
+    machine: &MachineCoefficients<f64>,
     q: &[f64; COORDINATES],
 ) -> Option<(&'static str, f64, &'static str)> {
     let machine = machine.constant();
     let q = q.map(N);
-    let stiffness = RIGID_MOTIONS.map(|(_, coordinates, _)| {
+    let rigid_stiffnesses = RIGID_MOTIONS.map(|(_, coordinates, _)| {
         let stiffness_by = |column: usize| {
             let forces = static_forces(&machine, &with_derivative(&q, column, 1.0));
             coordinates.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
         coordinates.into_iter().map(stiffness_by).sum::<f64>()
     });
-    let max_stiffness = |stiffnesses: &[f64]| {
-        stiffnesses.iter().fold(0.0_f64, |max_stiffness, k| max_stiffness.max(k.abs()))
+    let greatest_stiffness = |stiffnesses: &[f64]| {
+        stiffnesses.iter().fold(0.0_f64, |greatest_stiffness, k| greatest_stiffness.max(k.abs()))
     };
-    let scales = [max_stiffness(&stiffness[..2]), max_stiffness(&stiffness[2..])];
-    let relative_stiffnesses = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
+    let greatest_stiffnesses =
+        [greatest_stiffness(&rigid_stiffnesses[..2]), greatest_stiffness(&rigid_stiffnesses[2..])];
+    let relative_stiffnesses =
+        (0..RIGID_MOTIONS.len()).map(|k| (k, rigid_stiffnesses[k] / greatest_stiffnesses[k / 2]));
     let (least_stable_index, _) = relative_stiffnesses
         .filter(|(_, relative_stiffness)| *relative_stiffness < 0.0)
         .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let (motion, _, unit) = RIGID_MOTIONS[least_stable_index];
-    Some((motion, stiffness[least_stable_index], unit))
+    Some((motion, rigid_stiffnesses[least_stable_index], unit))
 }
 
 /// Computes the generalised forces at rest.
 #[inline(always)]
 fn static_forces<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     q: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let zero = q[0].lit(0.0);
@@ -184,7 +195,7 @@ mod tests {
         for spring in &mut machine.springs {
             spring.cabinet_m[2] = spring.tub_m[2];
         }
-        let coefficients = Coefficients::new(&machine);
+        let coefficients = MachineCoefficients::new(&machine);
         let (q, solved_lanes) = solve_equilibrium(N(0.0), &coefficients);
         assert_eq!(solved_lanes & 1, 1);
         let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
@@ -209,7 +220,7 @@ mod tests {
                 softness_m: 1e-6,
                 ..BumpStop::default()
             }];
-            let (q, solved_lanes) = solve_equilibrium(N(0.0), &Coefficients::new(&machine));
+            let (q, solved_lanes) = solve_equilibrium(N(0.0), &MachineCoefficients::new(&machine));
             assert_eq!(solved_lanes & 1, 1, "{stiffness_n_per_m:e}");
             let lowering_m = -(q[0].0 + 0.3 * q[5].0.sin() - 0.2 * (q[5].0.cos() - 1.0));
             let depth_m = lowering_m - 0.005;
@@ -227,7 +238,7 @@ mod tests {
             spring.tub_m[1] = -0.1626;
             spring.cabinet_m[2] = spring.tub_m[2];
         }
-        let coefficients = Coefficients::new(&machine);
+        let coefficients = MachineCoefficients::new(&machine);
         let (q, solved_lanes) = solve_equilibrium(N(0.0), &coefficients);
         assert_eq!(solved_lanes & 1, 0);
         let (motion, stiffness, _) = unstable_motion(&coefficients, &q.map(|q| q.0)).unwrap();
@@ -242,6 +253,6 @@ mod tests {
         for spring in &mut machine.springs {
             spring.stiffness_n_per_m = 1.0;
         }
-        assert_eq!(solve_equilibrium(N(0.0), &Coefficients::new(&machine)).1 & 1, 0);
+        assert_eq!(solve_equilibrium(N(0.0), &MachineCoefficients::new(&machine)).1 & 1, 0);
     }
 }

@@ -43,7 +43,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     /// Adds a load on the axis.
     #[inline(always)]
     pub(crate) fn add_load(&mut self, load: &AxisLoad<T>) {
-        (self.force, self.torque) = self.with_load(load);
+        (self.force, self.torque) = self.loaded_force_and_torque(load);
     }
 
     /// Adds a unit of generalised force on a coordinate, in the order y, z, rotations.
@@ -61,7 +61,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
 
     /// Returns the sums of the chain's force and torques and those of a load on the axis.
     #[inline(always)]
-    fn with_load(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
+    fn loaded_force_and_torque(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
         let [moment_y, moment_z] = load.moment;
         let mut torque = self.torque;
         torque[0] += self.axis[0][1] * moment_z;
@@ -76,9 +76,9 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     }
 
     /// Computes the accelerations of midpoint and axis and the compliance C = 1/m + G^T J^-1 G.
-    /// `inertia` holds the factors of J.
+    /// `inertia_factors` holds the factors of J.
     #[inline(always)]
-    pub(crate) fn axis_response(&self, inertia: &LdltFactors<T, R>) -> AxisResponse<T> {
+    pub(crate) fn axis_response(&self, inertia_factors: &LdltFactors<T, R>) -> AxisResponse<T> {
         let zero = self.inverse_mass.lit(0.0);
         // The rows of G: the torques that `add_load` adds per unit of force and moment, which by
         // virtual work are also the motions of the axis per unit of rotation.
@@ -96,10 +96,10 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
         // sides.
         for j in 0..R {
             for i in j + 1..R {
-                let lower = inertia.lower_entry(i, j);
-                torque[i] -= lower * torque[j];
+                let l_entry = inertia_factors.lower_entry(i, j);
+                torque[i] -= l_entry * torque[j];
                 for k in 0..4 {
-                    torques_per_load[i][k] -= lower * torques_per_load[j][k];
+                    torques_per_load[i][k] -= l_entry * torques_per_load[j][k];
                 }
             }
         }
@@ -114,10 +114,11 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
         compliance[1][1] = self.inverse_mass;
         for r in 0..R {
             for i in 0..4 {
-                let weighted = (torques_per_load[r][i] * inertia.reciprocal_pivot(r)).v();
-                unloaded_accelerations[i] += weighted * torque[r];
+                let weighted_torque =
+                    (torques_per_load[r][i] * inertia_factors.reciprocal_pivot(r)).v();
+                unloaded_accelerations[i] += weighted_torque * torque[r];
                 for j in 0..=i {
-                    compliance[i][j] += weighted * torques_per_load[r][j];
+                    compliance[i][j] += weighted_torque * torques_per_load[r][j];
                 }
             }
         }
@@ -125,41 +126,43 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
     }
 
     /// Computes the accelerations under a load on the axis: those of the bearing midpoint along y
-    /// and z, then those of the rotations. `inertia` holds the factors of J.
+    /// and z, then those of the rotations. `inertia_factors` holds the factors of J.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
-        inertia: &LdltFactors<T, R>,
+        inertia_factors: &LdltFactors<T, R>,
         load: &AxisLoad<T>,
     ) -> ([N<T>; 2], [N<T>; R]) {
-        let (force, torque) = self.with_load(load);
-        let rotation = inertia.solve(torque);
-        let mut translation = [
+        let (force, torque) = self.loaded_force_and_torque(load);
+        let rotational_accelerations = inertia_factors.solve(torque);
+        let mut translational_accelerations = [
             force[0] * self.inverse_mass - self.drift[0],
             force[1] * self.inverse_mass - self.drift[1],
         ];
         for r in 0..R {
             if r > 0 {
-                translation[0] -= self.arm[r][0] * rotation[r];
+                translational_accelerations[0] -= self.arm[r][0] * rotational_accelerations[r];
             }
-            translation[1] -= self.arm[r][1] * rotation[r];
+            translational_accelerations[1] -= self.arm[r][1] * rotational_accelerations[r];
         }
-        (translation, rotation)
+        (translational_accelerations, rotational_accelerations)
     }
 
     /// Computes the generalised forces f in M q'' = f: for the bearing midpoint along y and z, then
     /// for the rotations.
     #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
-        let midpoint = [
+        let midpoint_force = [
             self.force[0] - self.drift[0] / self.inverse_mass,
             self.force[1] - self.drift[1] / self.inverse_mass,
         ];
-        let mut rotation = self.torque;
+        let mut rotation_torques = self.torque;
         for r in 0..R {
-            rotation[r] = rotation[r] + self.arm[r][0] * midpoint[0] + self.arm[r][1] * midpoint[1];
+            rotation_torques[r] = rotation_torques[r]
+                + self.arm[r][0] * midpoint_force[0]
+                + self.arm[r][1] * midpoint_force[1];
         }
-        (midpoint, rotation)
+        (midpoint_force, rotation_torques)
     }
 }
 
@@ -167,7 +170,7 @@ impl<T: Real, const R: usize> FloatingChain<T, R> {
 #[derive(Clone, Copy)]
 pub(crate) struct LdltFactors<T, const R: usize> {
     /// L below the diagonal, without its unit diagonal, and 1/D on the diagonal.
-    packed: [[N<T>; R]; R],
+    packed_factors: [[N<T>; R]; R],
 }
 
 impl<T: Real, const R: usize> LdltFactors<T, R> {
@@ -181,8 +184,8 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
                 for k in j + 1..=i {
                     // Entries of column j before the division by the pivot: row i still has its
                     // own, and the upper triangle has those of the rows between j and i.
-                    let undivided = if k == i { a[i][j] } else { a[j][k] };
-                    a[i][k] -= l * undivided;
+                    let undivided_entry = if k == i { a[i][j] } else { a[j][k] };
+                    a[i][k] -= l * undivided_entry;
                 }
                 // The strict upper triangle keeps the column before its division by the pivot, for
                 // the following rows.
@@ -191,19 +194,19 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
             }
             a[j][j] = pivot;
         }
-        Self { packed: a }
+        Self { packed_factors: a }
     }
 
     /// Returns entry (row, column) of L, below the diagonal.
     #[inline(always)]
     fn lower_entry(&self, row: usize, column: usize) -> N<T> {
-        self.packed[row][column]
+        self.packed_factors[row][column]
     }
 
     /// Returns an entry of 1/D.
     #[inline(always)]
     fn reciprocal_pivot(&self, row: usize) -> N<T> {
-        self.packed[row][row]
+        self.packed_factors[row][row]
     }
 
     /// Returns a mask of the lanes whose matrix is positive definite.
@@ -212,8 +215,8 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
     where
         T: Lane,
     {
-        let zero = self.packed[0][0].lit(0.0);
-        (0..R).fold(u32::MAX, |bits, j| bits & T::bits(zero.0.less(self.packed[j][j].0)))
+        let zero = self.packed_factors[0][0].lit(0.0);
+        (0..R).fold(u32::MAX, |bits, j| bits & T::bits(zero.0.less(self.packed_factors[j][j].0)))
     }
 
     /// Solves for one right-hand side.
@@ -221,13 +224,13 @@ impl<T: Real, const R: usize> LdltFactors<T, R> {
     pub(crate) fn solve(&self, mut b: [N<T>; R]) -> [N<T>; R] {
         for j in 0..R {
             for i in j + 1..R {
-                b[i] -= self.packed[i][j] * b[j];
+                b[i] -= self.packed_factors[i][j] * b[j];
             }
         }
         for j in (0..R).rev() {
-            b[j] = (b[j] * self.packed[j][j]).v();
+            b[j] = (b[j] * self.packed_factors[j][j]).v();
             for i in j + 1..R {
-                b[j] -= self.packed[i][j] * b[i];
+                b[j] -= self.packed_factors[i][j] * b[i];
             }
         }
         b

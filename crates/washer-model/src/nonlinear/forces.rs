@@ -36,11 +36,12 @@ impl<T: Real> Deflection<T> {
     /// Computes the bearing load on the shaft.
     #[inline(always)]
     pub(crate) fn load_on_shaft(&self, b: &Bodies<T>) -> AxisLoad<T> {
-        let zero = b.front_stiffness.lit(0.0);
+        let zero = b.front_bearing_stiffness.lit(0.0);
         let mut load = AxisLoad { force: [zero; 2], moment: [zero; 2] };
-        for (position, stiffness) in
-            [(b.bearing_front, b.front_stiffness), (b.bearing_rear, b.rear_stiffness)]
-        {
+        for (position, stiffness) in [
+            (b.front_bearing_x, b.front_bearing_stiffness),
+            (b.rear_bearing_x, b.rear_bearing_stiffness),
+        ] {
             for i in 0..2 {
                 let force = -(stiffness * (self.offset[i] + position * self.tilt[i])).v();
                 load.force[i] += force;
@@ -61,20 +62,21 @@ pub(crate) fn flexure_moments<T: Real>(
 ) -> [N<T>; 2] {
     // sin^2 phi = 1 - cos^2 phi, written without cancellation.
     let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
-    let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
-    [(factor * (s9 * c10)).v(), (factor * (c9 * s10)).v()]
+    let moment_factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
+    [(moment_factor * (s9 * c10)).v(), (moment_factor * (c9 * s10)).v()]
 }
 
 /// The coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).
 const ASIN_SERIES: [f64; 22] = {
-    let mut c = [1.0; 22];
+    let mut coefficients = [1.0; 22];
     let mut k = 1;
-    while k < c.len() {
+    while k < coefficients.len() {
         let two_k = 2.0 * k as f64;
-        c[k] = c[k - 1] * ((two_k - 1.0) * (two_k - 1.0)) / (two_k * (two_k + 1.0));
+        coefficients[k] =
+            coefficients[k - 1] * ((two_k - 1.0) * (two_k - 1.0)) / (two_k * (two_k + 1.0));
         k += 1;
     }
-    c
+    coefficients
 };
 
 /// The greatest sin^2 phi for the short series of five terms. Basis: the first dropped term is
@@ -89,16 +91,16 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
         short_series = short_series * sin_squared + ASIN_SERIES[k];
     }
     let bound = sin_squared.lit(SMALL_SIN_SQUARED);
-    let is_small = sin_squared.0.less(bound.0);
+    let is_sin_small = sin_squared.0.less(bound.0);
     // The sine decreases again beyond pi/2, so that the sign of the cosine is tested too.
     let is_cos_positive = cos.lit(0.0).0.less(cos.0);
-    if T::all(is_small) && T::all(is_cos_positive) {
+    if T::all(is_sin_small) && T::all(is_cos_positive) {
         return short_series;
     }
     let quarter_angle_ratio = phi_over_sin_by_quarters(sin_squared, cos);
     N(T::select(
         is_cos_positive,
-        T::select(is_small, short_series.0, quarter_angle_ratio.0),
+        T::select(is_sin_small, short_series.0, quarter_angle_ratio.0),
         quarter_angle_ratio.0,
     ))
 }
@@ -110,9 +112,9 @@ fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     let sin_half_squared = 0.5 * (sin_squared / (1.0 + cos));
     let cos_half_squared = 1.0 - sin_half_squared.v();
     let sin_quarter_squared = (0.5 * (sin_half_squared.v() / (1.0 + cos_half_squared.sqrt()))).v();
-    let mut series = sin_quarter_squared.lit(ASIN_SERIES[21]);
+    let mut asin_series = sin_quarter_squared.lit(ASIN_SERIES[21]);
     for k in (0..21).rev() {
-        series = series * sin_quarter_squared + ASIN_SERIES[k];
+        asin_series = asin_series * sin_quarter_squared + ASIN_SERIES[k];
     }
-    series / ((1.0 - sin_quarter_squared) * cos_half_squared).v().sqrt()
+    asin_series / ((1.0 - sin_quarter_squared) * cos_half_squared).v().sqrt()
 }

@@ -69,7 +69,7 @@ pub(crate) struct Tilt<T> {
     /// The axis a1 in cabinet axes.
     pub(crate) axis_c: Vec3<T>,
     /// The vector a2 in cabinet axes.
-    pub(crate) second_c: Vec3<T>,
+    pub(crate) second_axis_c: Vec3<T>,
 }
 
 impl<T: Real> Tilt<T> {
@@ -95,14 +95,14 @@ impl<T: Real> Tilt<T> {
             sin_pitch,
             cos_pitch,
             axis_c: [(cos_yaw * cos_pitch).v(), sin_pitch, (-sin_yaw * cos_pitch).v()],
-            second_c: [(-cos_yaw * sin_pitch).v(), cos_pitch, (sin_yaw * sin_pitch).v()],
+            second_axis_c: [(-cos_yaw * sin_pitch).v(), cos_pitch, (sin_yaw * sin_pitch).v()],
         }
     }
 
     /// Transforms a vector from frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
     #[inline(always)]
     pub(crate) fn rotate_to_cabinet(&self, v: &Vec3<T>) -> Vec3<T> {
-        let [a1, a2] = [&self.axis_c, &self.second_c];
+        let [a1, a2] = [&self.axis_c, &self.second_axis_c];
         [
             a1[0] * v[0] + (a2[0] * v[1] + self.sin_yaw * v[2]),
             a1[1] * v[0] + a2[1] * v[1],
@@ -113,7 +113,11 @@ impl<T: Real> Tilt<T> {
     /// Transforms a vector from cabinet axes to frame axes.
     #[inline(always)]
     pub(crate) fn rotate_to_frame(&self, v: &Vec3<T>) -> Vec3<T> {
-        [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
+        [
+            dot(&self.axis_c, v),
+            dot(&self.second_axis_c, v),
+            self.sin_yaw * v[0] + self.cos_yaw * v[2],
+        ]
     }
 
     /// Computes the frame's angular velocity, and at constant generalised speeds the frame's
@@ -124,12 +128,13 @@ impl<T: Real> Tilt<T> {
         yaw_rate: N<T>,
         pitch_rate: N<T>,
     ) -> TiltMotion<T> {
-        let rate = [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
-        let [x, y, z] = rate;
+        let angular_velocity =
+            [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
+        let [x, y, z] = angular_velocity;
         TiltMotion {
-            rate,
-            acceleration_x: (y * z).v(),
-            acceleration_y: -(x * z).v(),
+            angular_velocity,
+            angular_acceleration_x: (y * z).v(),
+            angular_acceleration_y: -(x * z).v(),
             axis_acceleration: [-(y * y + z * z), (x * y).v(), (2.0 * (x * z).v()).v()],
         }
     }
@@ -137,7 +142,7 @@ impl<T: Real> Tilt<T> {
     /// Returns the derivatives of the axis by yaw and by pitch, y and z.
     #[inline(always)]
     pub(crate) fn axis_partials(&self) -> [[N<T>; 2]; 2] {
-        [[self.sin_yaw.lit(0.0), self.axis_yaw_z()], [self.second_c[1], self.second_c[2]]]
+        [[self.sin_yaw.lit(0.0), self.axis_yaw_z()], [self.second_axis_c[1], self.second_axis_c[2]]]
     }
 
     /// Returns the z component of the axis's derivative by yaw, whose y component is zero.
@@ -150,11 +155,11 @@ impl<T: Real> Tilt<T> {
 /// The motion of a tilted frame at constant generalised speeds.
 pub(crate) struct TiltMotion<T> {
     /// The angular velocity.
-    pub(crate) rate: Vec3<T>,
+    pub(crate) angular_velocity: Vec3<T>,
     /// The angular acceleration about a1.
-    pub(crate) acceleration_x: N<T>,
+    pub(crate) angular_acceleration_x: N<T>,
     /// The angular acceleration about a2. The angular acceleration about a3 is zero.
-    pub(crate) acceleration_y: N<T>,
+    pub(crate) angular_acceleration_y: N<T>,
     /// The second derivative of a1.
     pub(crate) axis_acceleration: Vec3<T>,
 }

@@ -9,7 +9,7 @@
 
 use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::coupling::{accelerations_under_load, mass_scaled_load};
 use crate::nonlinear::floating::LdltFactors;
 use crate::nonlinear::forces::Deflection;
@@ -20,7 +20,7 @@ use lane_ode::{Lane, N};
 /// forces and the inertia at coordinates `q` (m, rad) and speeds `u`.
 #[inline(always)]
 pub(crate) fn solve_implicit_stage<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
@@ -43,7 +43,7 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     }
     let mut deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
     let deflection_change =
-        Deflection::linear(&coordinate_change, &tub.chain.axis, &rotor.chain.axis);
+        Deflection::from_linear_model(&coordinate_change, &tub.chain.axis, &rotor.chain.axis);
     for i in 0..2 {
         deflection.offset[i] += deflection_change.offset[i];
         deflection.tilt[i] += deflection_change.tilt[i];

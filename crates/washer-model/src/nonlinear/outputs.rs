@@ -40,10 +40,10 @@ struct ChannelPoints<T> {
 /// Expands to the motion of one channel.
 macro_rules! channel_motion {
     ($points:ident, $motion:ident, [point $point:ident $axis:literal]) => {
-        component(&$points.$point, $axis)
+        component_sample(&$points.$point, $axis)
     };
     ($points:ident, $motion:ident, [angle $q:ident]) => {
-        sample($motion.q[$q], $motion.u[$q], $motion.a[$q])
+        new_sample($motion.q[$q], $motion.u[$q], $motion.a[$q])
     };
 }
 
@@ -79,7 +79,7 @@ fn combine_moving_vectors<T: Real>(
 
 /// The bodies' axes with their time derivatives, from which every output is computed; in cabinet
 /// axes unless noted.
-pub(crate) struct Axes<T> {
+pub(crate) struct BodyAxes<T> {
     tub: Tilt<T>,
     /// The angular velocity and acceleration of the tub, in tub axes.
     tub_rates: [Vec3<T>; 2],
@@ -89,7 +89,7 @@ pub(crate) struct Axes<T> {
     drum_axes: [MovingVector<T>; 2],
 }
 
-impl<T: Real> Axes<T> {
+impl<T: Real> BodyAxes<T> {
     #[inline(always)]
     pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let MovingCoordinates { q, u, a } = motion;
@@ -102,7 +102,7 @@ impl<T: Real> Axes<T> {
         // Angular velocities and accelerations of the shaft in axes S and of the drum in axes E, as
         // in `nonlinear::assemble_rotor` but with u'.
         let omega_s = {
-            let [x, y, z] = to_shaft_axes(spin, &shaft_motion.rate);
+            let [x, y, z] = to_shaft_axes(spin, &shaft_motion.angular_velocity);
             [x + spin.speed, y, z]
         };
         let alpha_s = {
@@ -125,7 +125,10 @@ impl<T: Real> Axes<T> {
         let (s10, c10) = q[HINGE_PITCH].sin_cos();
         let zero = s9.lit(0.0);
         Self {
-            tub_rates: [tub_motion.rate, angular_acceleration(&tub, &tub_motion, motion, TUB_YAW)],
+            tub_rates: [
+                tub_motion.angular_velocity,
+                angular_acceleration(&tub, &tub_motion, motion, TUB_YAW),
+            ],
             tub_axis: moving_axis(&tub, &tub_motion, motion, TUB_YAW),
             shaft_axis: moving_axis(&shaft, &shaft_motion, motion, SHAFT_YAW),
             drum_axes: [
@@ -144,7 +147,7 @@ impl<T: Real> Axes<T> {
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
     ) -> [Sample<T>; RADIAL_COMPONENTS] {
-        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
+        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front_x);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_rates;
         let separation = self.tub.rotate_to_frame(&subtract(drum_front.value, &tub_front.value));
@@ -160,8 +163,8 @@ impl<T: Real> Axes<T> {
             omega,
         );
         [
-            sample(separation[1], rate[1], acceleration[1]),
-            sample(separation[2], rate[2], acceleration[2]),
+            new_sample(separation[1], rate[1], acceleration[1]),
+            new_sample(separation[2], rate[2], acceleration[2]),
         ]
     }
 
@@ -172,8 +175,8 @@ impl<T: Real> Axes<T> {
         b: &Bodies<T>,
         motion: &MovingCoordinates<T>,
     ) -> [Sample<T>; CHANNELS] {
-        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front);
-        let tub_centre = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
+        let tub_front = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_front_x);
+        let tub_centre = moving_point(motion, TUB_Y, &self.tub_axis, b.tub_centre_x);
         let drum_front = self.drum_front(b, motion);
         let mut rho =
             combine_moving_vectors(b.rho_1, &self.drum_axes[0], b.rho_2, &self.drum_axes[1]);
@@ -204,14 +207,14 @@ impl<T: Real> Axes<T> {
 
     #[inline(always)]
     fn drum_front(&self, b: &Bodies<T>, motion: &MovingCoordinates<T>) -> MovingVector<T> {
-        let one = b.drum_hinge.lit(1.0);
-        let front = combine_moving_vectors(
-            b.drum_hinge,
+        let one = b.hinge_x.lit(1.0);
+        let front_offset = combine_moving_vectors(
+            b.hinge_x,
             &self.shaft_axis,
-            b.hinge_to_front,
+            b.hinge_to_front_distance,
             &self.drum_axes[0],
         );
-        moving_point(motion, SHAFT_Y, &front, one)
+        moving_point(motion, SHAFT_Y, &front_offset, one)
     }
 }
 
@@ -219,7 +222,7 @@ impl<T: Real> Axes<T> {
 /// smooth at zero, unlike its square.
 #[inline(always)]
 pub(crate) fn squared_distance<T: Real>([y, z]: &[Sample<T>; RADIAL_COMPONENTS]) -> Sample<T> {
-    sample(
+    new_sample(
         y.value * y.value + z.value * z.value,
         (2.0 * (y.value * y.slope + z.value * z.slope)).v(),
         (2.0 * (y.slope * y.slope
@@ -230,52 +233,54 @@ pub(crate) fn squared_distance<T: Real>([y, z]: &[Sample<T>; RADIAL_COMPONENTS])
 }
 
 #[inline(always)]
-fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
+fn new_sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
     Sample { value, slope, curvature }
 }
 
 #[inline(always)]
-fn component<T: Real>(vector: &MovingVector<T>, i: usize) -> Sample<T> {
-    sample(vector.value[i], vector.rate[i], vector.acceleration[i])
+fn component_sample<T: Real>(vector: &MovingVector<T>, i: usize) -> Sample<T> {
+    new_sample(vector.value[i], vector.rate[i], vector.acceleration[i])
 }
 
-/// Computes the angular acceleration of a frame tilted by coordinate `yaw` and the next one, in
-/// frame axes.
+/// Computes the angular acceleration of a frame tilted by coordinate `yaw_coordinate` and the next
+/// one, in frame axes.
 #[inline(always)]
 fn angular_acceleration<T: Real>(
     tilt: &Tilt<T>,
     tilt_motion: &TiltMotion<T>,
     motion: &MovingCoordinates<T>,
-    yaw: usize,
+    yaw_coordinate: usize,
 ) -> Vec3<T> {
-    let [yaw, pitch] = [motion.a[yaw], motion.a[yaw + 1]];
+    let yaw_acceleration = motion.a[yaw_coordinate];
+    let pitch_acceleration = motion.a[yaw_coordinate + 1];
     [
-        tilt_motion.acceleration_x + yaw * tilt.sin_pitch,
-        tilt_motion.acceleration_y + yaw * tilt.cos_pitch,
-        pitch,
+        tilt_motion.angular_acceleration_x + yaw_acceleration * tilt.sin_pitch,
+        tilt_motion.angular_acceleration_y + yaw_acceleration * tilt.cos_pitch,
+        pitch_acceleration,
     ]
 }
 
-/// Computes the motion of the axis of a frame tilted by coordinate `yaw` and the next one.
+/// Computes the motion of the axis of a frame tilted by coordinate `yaw_coordinate` and the next
+/// one.
 #[inline(always)]
 fn moving_axis<T: Real>(
     tilt: &Tilt<T>,
     tilt_motion: &TiltMotion<T>,
     MovingCoordinates { u, a, .. }: &MovingCoordinates<T>,
-    yaw: usize,
+    yaw_coordinate: usize,
 ) -> MovingVector<T> {
-    let rates = [u[yaw], u[yaw + 1]];
-    let accelerations = [a[yaw], a[yaw + 1]];
+    let rates = [u[yaw_coordinate], u[yaw_coordinate + 1]];
+    let accelerations = [a[yaw_coordinate], a[yaw_coordinate + 1]];
     let zero = rates[0].lit(0.0);
-    let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
-    let by_pitch = &tilt.second_c;
-    let at_constant_speeds = tilt.rotate_to_cabinet(&tilt_motion.axis_acceleration);
-    let by_accelerations =
-        linear_combination(accelerations[0], &by_yaw, accelerations[1], by_pitch);
+    let axis_per_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
+    let axis_per_pitch = &tilt.second_axis_c;
+    let acceleration_at_constant_speeds = tilt.rotate_to_cabinet(&tilt_motion.axis_acceleration);
+    let tangential_acceleration =
+        linear_combination(accelerations[0], &axis_per_yaw, accelerations[1], axis_per_pitch);
     MovingVector {
         value: tilt.axis_c,
-        rate: linear_combination(rates[0], &by_yaw, rates[1], by_pitch),
-        acceleration: add(at_constant_speeds, &by_accelerations),
+        rate: linear_combination(rates[0], &axis_per_yaw, rates[1], axis_per_pitch),
+        acceleration: add(acceleration_at_constant_speeds, &tangential_acceleration),
     }
 }
 
@@ -285,7 +290,7 @@ fn moving_axis<T: Real>(
 fn moving_drum_vector<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
-    hinge: (N<T>, N<T>),
+    hinge_sin_cos: (N<T>, N<T>),
     drum_rates: &[Vec3<T>; 2],
     v: &Vec3<T>,
 ) -> MovingVector<T> {
@@ -295,9 +300,9 @@ fn moving_drum_vector<T: Real>(
     let acceleration =
         add_cross_product(&add_cross_product(&zeros, &drum_rates[1], v), &drum_rates[0], &rate);
     MovingVector {
-        value: drum_to_cabinet_axes(shaft, spin, hinge, v),
-        rate: drum_to_cabinet_axes(shaft, spin, hinge, &rate),
-        acceleration: drum_to_cabinet_axes(shaft, spin, hinge, &acceleration),
+        value: drum_to_cabinet_axes(shaft, spin, hinge_sin_cos, v),
+        rate: drum_to_cabinet_axes(shaft, spin, hinge_sin_cos, &rate),
+        acceleration: drum_to_cabinet_axes(shaft, spin, hinge_sin_cos, &acceleration),
     }
 }
 
@@ -307,8 +312,9 @@ fn moving_cross_product<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> Mo
     let zero = [a.value[0].lit(0.0); 3];
     let value = add_cross_product(&zero, &a.value, &b.value);
     let rate = add_cross_product(&add_cross_product(&zero, &a.rate, &b.value), &a.value, &b.rate);
-    let mixed = add_cross_product(&zero, &a.rate, &b.rate);
-    let acceleration = add_cross_product(&add(mixed, &mixed), &a.acceleration, &b.value);
+    let rate_product = add_cross_product(&zero, &a.rate, &b.rate);
+    let acceleration =
+        add_cross_product(&add(rate_product, &rate_product), &a.acceleration, &b.value);
     MovingVector {
         value,
         rate,
@@ -337,15 +343,15 @@ fn moving_point<T: Real>(
     axis: &MovingVector<T>,
     distance: N<T>,
 ) -> MovingVector<T> {
-    let mut vector = MovingVector {
+    let mut moving_vector = MovingVector {
         value: scale(distance, axis.value),
         rate: scale(distance, axis.rate),
         acceleration: scale(distance, axis.acceleration),
     };
     for i in 0..2 {
-        vector.value[1 + i] += motion.q[coordinate + i];
-        vector.rate[1 + i] += motion.u[coordinate + i];
-        vector.acceleration[1 + i] += motion.a[coordinate + i];
+        moving_vector.value[1 + i] += motion.q[coordinate + i];
+        moving_vector.rate[1 + i] += motion.u[coordinate + i];
+        moving_vector.acceleration[1 + i] += motion.a[coordinate + i];
     }
-    vector
+    moving_vector
 }

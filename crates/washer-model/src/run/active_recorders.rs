@@ -3,7 +3,7 @@
 //! These recorders run over lanes after every step, in a function that is not inlined
 //! ([`Lane::run_out_of_line`]), so that the loop over steps is not slower if they are not in use.
 
-use super::loads::{Gauge, Loads};
+use super::loads::{Gauge, LoadRecorder};
 use super::snapshots::Snapshots;
 use super::{Method, MethodKind};
 use crate::channel::CHANNELS;
@@ -54,7 +54,7 @@ pub(crate) struct ActiveRecorders<T> {
     recorders: Recorders,
     square_integrals: SquareIntegrals<T, CHANNELS>,
     turn_peaks: IntervalPeaks<T, CHANNELS>,
-    loads: Option<Loads<T>>,
+    loads: Option<LoadRecorder<T>>,
     /// The time for which the gap is negative.
     clash_time: TimeAbove<T>,
     clearance_squared: N<T>,
@@ -84,7 +84,7 @@ impl<T: Lane> ActiveRecorders<T> {
             recorders,
             square_integrals: SquareIntegrals::new(zero),
             turn_peaks: IntervalPeaks::new(zero),
-            loads: Loads::new(zero, recorders.gauges, model, point, substeps.count),
+            loads: LoadRecorder::new(zero, recorders.gauges, model, point, substeps.count),
             clash_time: TimeAbove::new(zero),
             clearance_squared: zero,
             snapshots,
@@ -124,15 +124,15 @@ impl<T: Lane> ActiveRecorders<T> {
         }
         let [from_s, to_s] = point.window_s();
         // Rounding may make the integral of a motion at rest negative.
-        let to_root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
+        let to_root_mean_square = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !recorders.has_gauge(gauge) => Vec::new(),
             _ if gauge == Gauge::ClashTime => vec![self.clash_time.lane_time_s(lane)],
-            Some(loads) => loads.gauge(gauge, lane, point),
+            Some(loads) => loads.gauge_values(gauge, lane, point),
             None => Vec::new(),
         });
         let root_mean_squares = match recorders.root_mean_squares {
-            true => Some(self.square_integrals.lane_integrals(lane).map(to_root_mean)),
+            true => Some(self.square_integrals.lane_integrals(lane).map(to_root_mean_square)),
             false => None,
         };
         let checkpoints = Vec::new();
@@ -187,13 +187,13 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
         if recorders.has_gauge(Gauge::ClashTime) {
             // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
-            let mut overlap = squared_distance(radial);
-            overlap.value -= active_recorders.clearance_squared;
+            let mut squared_overlap = squared_distance(radial);
+            squared_overlap.value -= active_recorders.clearance_squared;
             match step {
                 Some((_, length_s)) => {
-                    active_recorders.clash_time.advance(length_s, &overlap, lanes_in_window)
+                    active_recorders.clash_time.advance(length_s, &squared_overlap, lanes_in_window)
                 }
-                None => active_recorders.clash_time.begin(&overlap),
+                None => active_recorders.clash_time.begin(&squared_overlap),
             }
         }
     }

@@ -16,8 +16,9 @@ impl Point {
     pub fn separations(&self, a: &Checkpoints, b: &Checkpoints) -> Vec<(f64, f64)> {
         let mut largest_deviations = [self.rest_limit_m(); COMPARED_COORDINATES];
         for checkpoint in b {
-            for (i, largest) in largest_deviations.iter_mut().enumerate() {
-                *largest = largest.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
+            for (i, largest_deviation) in largest_deviations.iter_mut().enumerate() {
+                *largest_deviation =
+                    largest_deviation.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
             }
         }
         let separation = |((a, b), segment): ((&Checkpoint, &Checkpoint), &PlannedSegment)| {
@@ -41,16 +42,16 @@ mod tests {
         let timing = Timing { end_s: 2.0, window_s: [0.0, 2.0], checkpoints: 4 };
         let point = prepare(Simd::best(), &[(Machine::paper(), spin)], &timing).remove(0);
         let point = point.unwrap();
-        let at_rest = |deviation: f64| {
+        let checkpoints_at = |deviation: f64| {
             let coordinates = point.equilibrium.map(|q| q + deviation);
             vec![Checkpoint { coordinates }; point.segments.len()]
         };
-        let greatest = |a: f64, b: f64| {
-            let separations = point.separations(&at_rest(a), &at_rest(b));
+        let greatest_separation = |a: f64, b: f64| {
+            let separations = point.separations(&checkpoints_at(a), &checkpoints_at(b));
             separations.into_iter().map(|(_, distance)| distance).fold(0.0, f64::max)
         };
-        assert!(greatest(1e-15, -1e-15) < 1e-2);
-        assert!((greatest(1e-3, 2e-3) - 0.5).abs() < 1e-9);
-        assert_eq!(greatest(1e-3, 1e-3), 0.0);
+        assert!(greatest_separation(1e-15, -1e-15) < 1e-2);
+        assert!((greatest_separation(1e-3, 2e-3) - 0.5).abs() < 1e-9);
+        assert_eq!(greatest_separation(1e-3, 1e-3), 0.0);
     }
 }

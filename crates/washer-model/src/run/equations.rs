@@ -17,10 +17,10 @@ pub const STATE_LEN: usize = STATES;
 /// of the model page, the linear model's are deviations from equilibrium.
 pub struct PointEquations {
     model: EitherModel,
-    at_rest: [f64; STATES],
+    rest_state: [f64; STATES],
     spin_segments: Arc<[SpinSegment]>,
     /// The index of the spin segment at the last call.
-    spin_segment: usize,
+    spin_segment_index: usize,
 }
 
 /// A model over plain numbers and over dual numbers.
@@ -38,22 +38,27 @@ enum EitherModel {
 impl PointEquations {
     /// Creates the equations of one model at a point.
     pub fn new(point: &Point, model: ModelKind) -> Self {
-        let (model, at_rest) = match model {
+        let (model, rest_state) = match model {
             ModelKind::Nonlinear => (
                 EitherModel::Nonlinear(DifferentiableModel::new(point)),
-                <Nonlinear<f64> as LaneModel<f64>>::at_rest(point),
+                <Nonlinear<f64> as LaneModel<f64>>::rest_state(point),
             ),
             ModelKind::Linear => (
                 EitherModel::Linear(DifferentiableModel::new(point)),
-                <Linear<f64> as LaneModel<f64>>::at_rest(point),
+                <Linear<f64> as LaneModel<f64>>::rest_state(point),
             ),
         };
-        Self { model, at_rest, spin_segments: Arc::clone(&point.spin_segments), spin_segment: 0 }
+        Self {
+            model,
+            rest_state,
+            spin_segments: Arc::clone(&point.spin_segments),
+            spin_segment_index: 0,
+        }
     }
 
     /// Returns the state at rest in static equilibrium, from which trajectories start.
-    pub const fn at_rest(&self) -> &[f64; STATE_LEN] {
-        &self.at_rest
+    pub const fn rest_state(&self) -> &[f64; STATE_LEN] {
+        &self.rest_state
     }
 
     /// Returns the times (s) at which the spin's acceleration, and therefore f, may jump. An
@@ -120,13 +125,13 @@ impl PointEquations {
         let is_before = |k: usize| {
             self.spin_segments.get(k).is_none_or(|spin_segment| t_s < spin_segment.start_s.0)
         };
-        if is_before(self.spin_segment + 1)
-            && (self.spin_segment == 0 || !is_before(self.spin_segment))
+        if is_before(self.spin_segment_index + 1)
+            && (self.spin_segment_index == 0 || !is_before(self.spin_segment_index))
         {
             return;
         }
-        self.spin_segment = segment_index(&self.spin_segments, t_s);
-        let spin_segment = &self.spin_segments[self.spin_segment];
+        self.spin_segment_index = segment_index(&self.spin_segments, t_s);
+        let spin_segment = &self.spin_segments[self.spin_segment_index];
         match &mut self.model {
             EitherModel::Nonlinear(models) => models.set_spin(spin_segment),
             EitherModel::Linear(models) => models.set_spin(spin_segment),

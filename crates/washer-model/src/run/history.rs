@@ -19,7 +19,7 @@ use crate::run::method::{
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::position_in_step;
 use crate::run::suspension::compute_forces;
-use crate::{COORDINATES, Forces, Method, MethodKind, ModelKind, Point};
+use crate::{COORDINATES, Method, MethodKind, ModelKind, Point, SuspensionForces};
 use core::marker::PhantomData;
 use lane_ode::{
     Cancel, Failure, Kernel, Lane, MAX_LANES, N, ObservedStep, OutOfLine, Sample, Segment,
@@ -65,16 +65,17 @@ pub struct InitialDeviation {
 
 /// Integrates one model at one point, and returns its states at 0, `interval_s`, 2 `interval_s` and
 /// so on to the end of the run.
-pub fn history<'a>(
+pub fn integrate_history<'a>(
     model: ModelKind,
     method: &Method,
     point: &'a Point,
-    start: &InitialDeviation,
+    initial_deviation: &InitialDeviation,
     interval_s: f64,
 ) -> History<'a> {
     let end_s = point.segments.last().map_or(0.0, |segment| segment.end_s);
     let times_s = (0..instant_count(end_s, interval_s)).map(|k| k as f64 * interval_s).collect();
-    let requests = [HistoryRequest { point, method: *method, start: *start, times_s }];
+    let requests =
+        [HistoryRequest { point, method: *method, initial_deviation: *initial_deviation, times_s }];
     let samples = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
     let [request] = requests;
     History::new(model, request, samples)
@@ -93,7 +94,7 @@ pub struct HistoryRequest<'a> {
     pub point: &'a Point,
     /// The method of integration.
     pub method: Method,
-    pub start: InitialDeviation,
+    pub initial_deviation: InitialDeviation,
     /// The instants in order, the first at 0.
     pub times_s: Vec<f64>,
 }
@@ -102,7 +103,7 @@ pub struct HistoryRequest<'a> {
 /// lanes are integrated at once. The bits of a history do not depend on the other points. Histories
 /// end early once `cancel` is requested. `cancel` is polled at least every
 /// [`CANCEL_POLL_STEPS`](lane_ode::CANCEL_POLL_STEPS) steps.
-pub fn histories<'a>(
+pub fn integrate_histories<'a>(
     model: ModelKind,
     requests: Vec<HistoryRequest<'a>>,
     cancel: Cancel<'_>,
@@ -123,7 +124,7 @@ pub fn histories<'a>(
     }
 }
 
-/// Returns the number of points that [`histories`] integrates at once.
+/// Returns the number of points that [`integrate_histories`] integrates at once.
 pub fn histories_per_batch() -> usize {
     Simd::narrow_set().lanes()
 }
@@ -184,7 +185,7 @@ impl<'a> History<'a> {
     }
 
     /// Computes the outputs at instant `k`; `None` if the trajectory failed before.
-    pub fn instant(&self, k: usize) -> Option<InstantOutputs> {
+    pub fn instant_outputs(&self, k: usize) -> Option<InstantOutputs> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
@@ -207,7 +208,7 @@ impl<'a> History<'a> {
 
     /// Computes the forces of the suspension at instant `k`; `None` if the trajectory failed
     /// before.
-    pub fn forces(&self, k: usize) -> Option<Forces> {
+    pub fn forces(&self, k: usize) -> Option<SuspensionForces> {
         self.states.get(k).map(|state| compute_forces(self.point, self.model, state))
     }
 }
@@ -276,7 +277,7 @@ struct SamplingTask<'a, T, M> {
     requests: &'a [HistoryRequest<'a>],
     cancel: Cancel<'a>,
     /// The index of each lane's segment, once the lane has started.
-    segments: [Option<usize>; MAX_LANES],
+    segment_indices: [Option<usize>; MAX_LANES],
     samples: Vec<SampledStates>,
 }
 
@@ -289,15 +290,15 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
             model.set_point(lane, request.point);
         }
         let to_start_sample = |request: &HistoryRequest<'_>| {
-            let mut start = M::at_rest(request.point);
+            let mut start_state = M::rest_state(request.point);
             for i in 0..COORDINATES {
-                start[i] += request.start.deviations[i];
-                start[COORDINATES + i] += request.start.speeds[i];
+                start_state[i] += request.initial_deviation.deviations[i];
+                start_state[COORDINATES + i] += request.initial_deviation.speeds[i];
             }
-            SampledStates { states: vec![start], failure: None }
+            SampledStates { states: vec![start_state], failure: None }
         };
         let samples = requests.iter().map(to_start_sample).collect();
-        Self { model, zero, requests, cancel, segments: [None; MAX_LANES], samples }
+        Self { model, zero, requests, cancel, segment_indices: [None; MAX_LANES], samples }
     }
 }
 
@@ -317,13 +318,13 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
         // Lanes without a request keep the initial state of the last one.
-        let index = lane.min(self.requests.len() - 1);
-        let HistoryRequest { point, method, .. } = &self.requests[index];
-        let samples = &mut self.samples[index];
+        let request_index = lane.min(self.requests.len() - 1);
+        let HistoryRequest { point, method, .. } = &self.requests[request_index];
+        let samples = &mut self.samples[request_index];
         let next_segment_index = match segment_end {
-            SegmentEnd::Idle if index < lane => point.segments.len(),
+            SegmentEnd::Idle if request_index < lane => point.segments.len(),
             SegmentEnd::Idle => 0,
-            SegmentEnd::Completed(_) => self.segments[lane].map_or(0, |segment| segment + 1),
+            SegmentEnd::Completed(_) => self.segment_indices[lane].map_or(0, |segment| segment + 1),
             SegmentEnd::Failed { reason, time_s, .. } => {
                 samples.failure = Some((reason, time_s));
                 point.segments.len()
@@ -332,12 +333,12 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         let segment = point.segments.get(next_segment_index);
         if next_segment_index == 0 || segment.is_none() {
             // An idle lane has a state at which the model is defined.
-            for (x, start) in x.iter_mut().zip(samples.states[0]) {
-                x.0.set(lane, start);
+            for (x, start_state) in x.iter_mut().zip(samples.states[0]) {
+                x.0.set(lane, start_state);
             }
         }
         let segment = segment?;
-        self.segments[lane] = Some(next_segment_index);
+        self.segment_indices[lane] = Some(next_segment_index);
         Some(start_segment(&mut self.model, lane, method, point, segment))
     }
 
@@ -347,7 +348,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
     #[inline(always)]
     fn observe(&mut self, _: &M::Forcing, step: &ObservedStep<'_, T, STATES>) {
         // If a step leaves the range of the model, the states inside it are meaningless too.
-        let in_range = T::bits(self.model.in_range(step.end_state));
+        let lanes_in_range = T::bits(self.model.in_range(step.end_state));
         loop {
             let mut position = self.zero;
             let mut has_instant = [false; MAX_LANES];
@@ -356,7 +357,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
                 let length_s = step.length_s.0.get(lane);
                 let next_time_s = request.times_s.get(self.samples[lane].states.len());
                 if let Some(time_s) = next_time_s
-                    && in_range >> lane & 1 == 1
+                    && lanes_in_range >> lane & 1 == 1
                     && let Some(lane_position) = position_in_step(*time_s, end_s, length_s)
                 {
                     has_instant[lane] = true;

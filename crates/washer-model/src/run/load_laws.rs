@@ -93,7 +93,7 @@ impl<T: Lane> LoadLaws<T> {
         };
         let elements = point.machine.elements.with_viscous_friction().constant();
         let unit_state = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
-        let components_by = |state: usize| {
+        let components_at_unit = |state: usize| {
             let mut components = vec![dual(0.0, 0.0); selection.component_count()];
             selection.evaluate(
                 &elements,
@@ -103,10 +103,10 @@ impl<T: Lane> LoadLaws<T> {
             components
         };
         let cabinet_force_at =
-            |state: &[f64; STATES]| compute_forces(point, ModelKind::Linear, state).cabinet_n;
+            |state: &[f64; STATES]| compute_forces(point, ModelKind::Linear, state).cabinet_force_n;
         for k in 0..4 {
             let [coordinate, speed] = [TUB_COORDINATES[k], COORDINATES + TUB_COORDINATES[k]];
-            let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
+            let slopes = components_at_unit(coordinate).into_iter().zip(components_at_unit(speed));
             for (component, (N(coordinate_derivative), N(speed_derivative))) in
                 components.iter_mut().zip(slopes)
             {

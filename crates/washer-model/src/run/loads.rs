@@ -44,7 +44,7 @@ pub(crate) type GaugeSelection = [bool; Gauge::ALL.len()];
 ///
 /// Basis: a power of two, so that differences from it keep most digits of loads. Doubling it loses
 /// one binary digit.
-const REFERENCE_N: f64 = 1_048_576.0;
+const REFERENCE_LOAD_N: f64 = 1_048_576.0;
 
 /// The summand under the square root of the horizontal force (N^2). Without it the root has no
 /// derivative at zero force.
@@ -69,14 +69,14 @@ struct StopRecord<T> {
 /// Loads are recorded by values and slopes, without second derivatives. Within a long step the
 /// motion is therefore interpolated, and loads are evaluated at the ends of a few parts of the
 /// step.
-pub(crate) struct Loads<T> {
+pub(crate) struct LoadRecorder<T> {
     selection: LoadSelection,
     load_laws: LoadLaws<T>,
     /// The load components at the last instant.
     components: Vec<N<Dual<T>>>,
     /// The square of the force on the cabinet.
     force_squared: Peaks<T, 1>,
-    /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_N`].
+    /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_LOAD_N`].
     distances_below_reference_n: Peaks<T, { MAX_FEET + 2 }>,
     distribution: Option<LoadDistribution<T>>,
     stops: Vec<StopRecord<T>>,
@@ -89,7 +89,7 @@ pub(crate) struct Loads<T> {
     substeps: u32,
 }
 
-impl<T: Lane> Loads<T> {
+impl<T: Lane> LoadRecorder<T> {
     /// Creates the recorder with the same point in every lane; `None` if no loads are recorded.
     #[inline(always)]
     pub(crate) fn new(
@@ -165,13 +165,13 @@ impl<T: Lane> Loads<T> {
 
     /// Returns the values of a gauge for the point in one lane: one for each element of the
     /// machine, or a single one.
-    pub(crate) fn gauge(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
+    pub(crate) fn gauge_values(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
         let max_value = |peaks: &Peaks<T, 1>| peaks.lane_peaks(lane)[0];
         let min_loads = |indices: core::ops::Range<usize>| {
             let indices = if self.distribution.is_some() { indices } else { 0..0 };
             self.distances_below_reference_n.lane_peaks(lane)[indices]
                 .iter()
-                .map(|below_n| REFERENCE_N - below_n)
+                .map(|below_n| REFERENCE_LOAD_N - below_n)
                 .collect()
         };
         match gauge {
@@ -200,22 +200,22 @@ impl<T: Lane> Loads<T> {
         dx: &[N<T>; STATES],
         lanes_in_window: T::Mask,
     ) {
-        let tub_now = tub_samples(x, dx);
-        let substeps = if step.is_some() { self.substeps } else { 1 };
-        let substep_share = 1.0 / f64::from(substeps);
+        let current_tub = tub_samples(x, dx);
+        let substep_count = if step.is_some() { self.substeps } else { 1 };
+        let substep_share = 1.0 / f64::from(substep_count);
         // The end of the step is in the same loop as the other instants, so that the force laws are
         // compiled once.
-        for substep in 1..=substeps {
-            let mut tub = tub_now;
+        for substep in 1..=substep_count {
+            let mut tub = current_tub;
             let mut step_s = None;
             if let Some((_, length_s)) = step {
                 step_s = Some((substep_share * length_s).v());
-                if substep < substeps {
+                if substep < substep_count {
                     for k in 0..4 {
                         let position = substep_share * f64::from(substep);
                         tub[k] = Sample::interpolate(
                             &self.previous_tub[k],
-                            &tub_now[k],
+                            &current_tub[k],
                             length_s,
                             position,
                         );
@@ -224,7 +224,7 @@ impl<T: Lane> Loads<T> {
             }
             self.record_instant(step_s, &tub, lanes_in_window);
         }
-        self.previous_tub = tub_now;
+        self.previous_tub = current_tub;
     }
 
     /// Evaluates and records the loads at one motion of the tub. `step_s` is the time since the
@@ -270,32 +270,32 @@ impl<T: Lane> Loads<T> {
     }
 }
 
-/// Computes the distances below [`REFERENCE_N`] of the load of each foot and of both margins, from
-/// the load on the cabinet.
+/// Computes the distances below [`REFERENCE_LOAD_N`] of the load of each foot and of both margins,
+/// from the load on the cabinet.
 #[inline(always)]
 fn distances_below_reference<T: Lane>(
     distribution: &LoadDistribution<T>,
     components: &[N<Dual<T>>],
 ) -> [Sample<T>; MAX_FEET + 2] {
     let distribution = distribution.constant();
-    let reference = components[0].lit(REFERENCE_N);
-    let mut load = [reference; LOAD_COMPONENTS];
+    let reference_n = components[0].lit(REFERENCE_LOAD_N);
+    let mut load = [reference_n; LOAD_COMPONENTS];
     load.copy_from_slice(&components[..LOAD_COMPONENTS]);
-    let mut distances_below_reference_n = [to_sample(reference); MAX_FEET + 2];
+    let mut distances_below_reference_n = [to_sample(reference_n); MAX_FEET + 2];
     let mut foot_loads = distribution.cabinet_weight_loads;
     for k in 0..MAX_FEET {
         for i in 0..LOAD_COMPONENTS {
             foot_loads[k] += distribution.loads_per_component[k][i] * load[i];
         }
-        distances_below_reference_n[k] = to_sample(reference - foot_loads[k]);
+        distances_below_reference_n[k] = to_sample(reference_n - foot_loads[k]);
     }
     let force_squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
     let slip_margin = distribution.friction_coefficient * (distribution.cabinet_weight - load[1])
         - force_squared.sqrt();
     let walk_margin =
         slip_margin - turning_force_n(&distribution.foot_positions, &foot_loads, &load);
-    distances_below_reference_n[SLIP_INDEX] = to_sample(reference - slip_margin);
-    distances_below_reference_n[WALK_INDEX] = to_sample(reference - walk_margin);
+    distances_below_reference_n[SLIP_INDEX] = to_sample(reference_n - slip_margin);
+    distances_below_reference_n[WALK_INDEX] = to_sample(reference_n - walk_margin);
     distances_below_reference_n
 }
 

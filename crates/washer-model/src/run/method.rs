@@ -153,8 +153,11 @@ impl Method {
             Formula::Rk4 => 4,
             Formula::Dop853 => 8,
         };
-        let cap = self.caps.bearings_rad_per_s;
-        format!("{name} (order {order}, step {step_ms:.3} ms, bearings capped at {cap:.0} rad/s)")
+        let cap_rad_per_s = self.caps.bearings_rad_per_s;
+        format!(
+            "{name} (order {order}, step {step_ms:.3} ms, bearings capped at {cap_rad_per_s:.0} \
+             rad/s)"
+        )
     }
 
     /// Calls a visitor with the stepper of this method.

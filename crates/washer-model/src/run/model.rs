@@ -8,12 +8,12 @@ use crate::linear::rotor_terms::RotorCoefficients;
 use crate::linear::step::{self, RotorArrays, StepConstants};
 use crate::machine::parameters::MAX_COORDINATE_M;
 use crate::machine::spin::{SpinSegment, SpinSegmentLanes, SpinState};
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::implicit_stage::solve_implicit_stage;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
+use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates, RADIAL_COMPONENTS};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System};
@@ -32,7 +32,7 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
     /// Widens the corners of forces that depend on distances to a width (m), in one lane.
     fn widen_corners(&mut self, _lane: usize, _width_m: f64) {}
     /// Returns the state at rest, from which trajectories start.
-    fn at_rest(point: &Point) -> [f64; STATES];
+    fn rest_state(point: &Point) -> [f64; STATES];
     /// Appends the forces with corners at a state to a list, if the model has any.
     fn append_corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Computes the position of the drum's front centre relative to the tub axis, and if
@@ -78,19 +78,19 @@ fn join_derivative<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) ->
 #[inline(always)]
 fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
     // A single comparison of the sum is enough; NaN and infinity fail it too.
-    let mut sum = x[0].lit(0.0);
+    let mut sum_of_squares = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
         let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
         let relative_coordinate = (*q * (1.0 / limit)).v();
-        sum += relative_coordinate * relative_coordinate;
+        sum_of_squares += relative_coordinate * relative_coordinate;
     }
-    sum.0.less(sum.lit(1.0).0)
+    sum_of_squares.0.less(sum_of_squares.lit(1.0).0)
 }
 
 /// The nonlinear model.
 pub(crate) struct Nonlinear<T> {
     coupling: Coupling<T>,
-    machine: Coefficients<T>,
+    machine: MachineCoefficients<T>,
     spin: SpinSegmentLanes<T>,
     /// The channels at the static equilibrium.
     channels_at_rest: [N<T>; CHANNELS],
@@ -162,7 +162,7 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
             coupling,
-            machine: Coefficients::splat(zero, &point.machine),
+            machine: MachineCoefficients::splat(zero, &point.machine),
             spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
             channels_at_rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
@@ -187,9 +187,9 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
         self.machine.elements.widen_corners(lane, width_m);
     }
 
-    fn at_rest(point: &Point) -> [f64; STATES] {
-        let perturbed = |i: usize| point.equilibrium[i] + point.perturbation;
-        core::array::from_fn(|i| if i < COORDINATES { perturbed(i) } else { 0.0 })
+    fn rest_state(point: &Point) -> [f64; STATES] {
+        let perturbed_coordinate = |i: usize| point.equilibrium[i] + point.perturbation;
+        core::array::from_fn(|i| if i < COORDINATES { perturbed_coordinate(i) } else { 0.0 })
     }
 
     #[inline(always)]
@@ -206,7 +206,7 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
         with_channels: bool,
     ) -> ([Sample<T>; RADIAL_COMPONENTS], Option<[Sample<T>; CHANNELS]>) {
         let motion = moving_coordinates(x, dx);
-        let axes = Axes::new(spin, &motion);
+        let axes = BodyAxes::new(spin, &motion);
         let bodies = &self.machine.bodies;
         let mut channels = None;
         if with_channels {
@@ -337,7 +337,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
         self.coupling.set_caps(lane, caps);
     }
 
-    fn at_rest(_: &Point) -> [f64; STATES] {
+    fn rest_state(_: &Point) -> [f64; STATES] {
         [0.0; STATES]
     }
 

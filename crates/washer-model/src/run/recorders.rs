@@ -45,7 +45,7 @@ pub struct Reading {
 
 impl Reading {
     /// Returns the recorded values of a gauge; none if the gauge was not in use.
-    pub fn gauge(&self, gauge: Gauge) -> &[f64] {
+    pub fn gauge_values(&self, gauge: Gauge) -> &[f64] {
         &self.gauges[gauge as usize]
     }
 }
@@ -57,7 +57,7 @@ impl Recorders {
     }
 
     /// Creates recorders of which only a gauge is in use.
-    pub fn gauge(gauge: Gauge) -> Self {
+    pub fn with_gauge(gauge: Gauge) -> Self {
         Self { gauges: Gauge::ALL.map(|other| other == gauge), ..Self::default() }
     }
 

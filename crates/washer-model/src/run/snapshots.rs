@@ -27,7 +27,7 @@ pub struct Snapshot {
     /// acceleration (m/s^2, rad/s^2), in the order of `Channel::ALL`.
     pub channels: [[f64; 3]; CHANNELS],
     /// The tub's coordinates (m, rad), each with its speed.
-    tub: [[f64; 2]; 4],
+    tub_coordinates: [[f64; 2]; 4],
 }
 
 impl Snapshot {
@@ -35,11 +35,11 @@ impl Snapshot {
     /// are those of the trajectory.
     pub fn cabinet_force_n(&self, point: &Point, model: ModelKind) -> [f64; 3] {
         let mut state = [0.0; STATES];
-        for (q, [position, speed]) in TUB_COORDINATES.into_iter().zip(self.tub) {
+        for (q, [position, speed]) in TUB_COORDINATES.into_iter().zip(self.tub_coordinates) {
             state[q] = position;
             state[COORDINATES + q] = speed;
         }
-        compute_forces(point, model, &state).cabinet_n
+        compute_forces(point, model, &state).cabinet_force_n
     }
 }
 
@@ -55,14 +55,18 @@ struct LaneSnapshots {
 pub(super) struct Snapshots<T> {
     lanes: [LaneSnapshots; MAX_LANES],
     channels: [Sample<T>; CHANNELS],
-    tub: [Sample<T>; 4],
+    tub_coordinates: [Sample<T>; 4],
 }
 
 impl<T: Lane> Snapshots<T> {
     #[inline(always)]
     pub(super) fn new(zero: N<T>) -> Self {
         let zero_sample = Sample::constant(zero, zero);
-        Self { lanes: Default::default(), channels: [zero_sample; CHANNELS], tub: [zero_sample; 4] }
+        Self {
+            lanes: Default::default(),
+            channels: [zero_sample; CHANNELS],
+            tub_coordinates: [zero_sample; 4],
+        }
     }
 
     /// Begins a point's trajectory in one lane.
@@ -95,25 +99,36 @@ impl<T: Lane> Snapshots<T> {
                 let LaneSnapshots { instants_s, snapshots: recorded_snapshots } =
                     &mut self.lanes[lane];
                 while let Some(&time_s) = instants_s.get(recorded_snapshots.len())
-                    && let Some(fraction) = position_in_step(time_s, end_s, length_s)
+                    && let Some(step_position) = position_in_step(time_s, end_s, length_s)
                 {
                     let mut snapshot =
-                        Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
+                        Snapshot { channels: [[0.0; 3]; CHANNELS], tub_coordinates: [[0.0; 2]; 4] };
                     for i in 0..CHANNELS {
-                        let sample =
-                            interpolate(&self.channels[i], &channels[i], lane, length_s, fraction);
+                        let sample = interpolate(
+                            &self.channels[i],
+                            &channels[i],
+                            lane,
+                            length_s,
+                            step_position,
+                        );
                         snapshot.channels[i] = [sample.value.0, sample.slope.0, sample.curvature.0];
                     }
                     for i in 0..4 {
-                        let sample = interpolate(&self.tub[i], &tub[i], lane, length_s, fraction);
-                        snapshot.tub[i] = [sample.value.0, sample.slope.0];
+                        let sample = interpolate(
+                            &self.tub_coordinates[i],
+                            &tub[i],
+                            lane,
+                            length_s,
+                            step_position,
+                        );
+                        snapshot.tub_coordinates[i] = [sample.value.0, sample.slope.0];
                     }
                     recorded_snapshots.push(snapshot);
                 }
             }
         }
         self.channels = *channels;
-        self.tub = tub;
+        self.tub_coordinates = tub;
     }
 }
 
@@ -124,20 +139,20 @@ fn interpolate<T: Lane>(
     end: &Sample<T>,
     lane: usize,
     length_s: f64,
-    fraction: f64,
+    step_position: f64,
 ) -> Sample<f64> {
     let to_lane_sample = |sample: &Sample<T>| Sample {
         value: N(sample.value.0.get(lane)),
         slope: N(sample.slope.0.get(lane)),
         curvature: N(sample.curvature.0.get(lane)),
     };
-    Sample::interpolate(&to_lane_sample(start), &to_lane_sample(end), N(length_s), fraction)
+    Sample::interpolate(&to_lane_sample(start), &to_lane_sample(end), N(length_s), step_position)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::history::{InitialDeviation, history};
+    use crate::run::history::{InitialDeviation, integrate_history};
     use crate::{
         Channel, Machine, Method, Profile, Recorders, Spin, Timing, prepare, simulate_with,
     };
@@ -154,11 +169,11 @@ mod tests {
                 (machine, spin.clone())
             })
             .into();
-        let every_s = 0.0137;
-        let instants: Arc<[f64]> = (0..=218).map(|k| f64::from(k) * every_s).collect();
+        let interval_s = 0.0137;
+        let instants_s: Arc<[f64]> = (0..=218).map(|k| f64::from(k) * interval_s).collect();
         let points: Vec<Point> = prepare(Simd::best(), &machines, &timing)
             .into_iter()
-            .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants)))
+            .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants_s)))
             .collect();
         let recorders = Recorders { snapshots: true, ..Recorders::default() };
         let method = Method::rk4(2e-4);
@@ -169,13 +184,18 @@ mod tests {
             let (_, single_reading) =
                 simulate_with(Simd::Scalar, model, &method, &all_points[1..2], recorders);
             assert_eq!(readings_in_lanes[1].snapshots, single_reading[0].snapshots);
-            let history =
-                history(model, &method, all_points[1], &InitialDeviation::default(), every_s);
+            let history = integrate_history(
+                model,
+                &method,
+                all_points[1],
+                &InitialDeviation::default(),
+                interval_s,
+            );
             let mut largest_values = [0.0_f64; 3];
             let mut largest_differences = [0.0_f64; 3];
             let yaw_index = Channel::TubYaw.index();
             for (k, snapshot) in single_reading[0].snapshots.iter().enumerate() {
-                let expected = history.instant(k).unwrap();
+                let expected = history.instant_outputs(k).unwrap();
                 let pairs = [
                     (snapshot.channels[yaw_index][0], expected.channels[yaw_index]),
                     (snapshot.channels[yaw_index][1], expected.rates[yaw_index]),
@@ -186,11 +206,11 @@ mod tests {
                     largest_differences[i] = largest_differences[i].max((value - expected).abs());
                 }
                 let force = snapshot.cabinet_force_n(all_points[1], model);
-                let expected = history.forces(k).unwrap().cabinet_n;
+                let expected = history.forces(k).unwrap().cabinet_force_n;
                 let error_n = (0..3).map(|i| (force[i] - expected[i]).abs()).fold(0.0, f64::max);
                 assert!(error_n < 1e-4, "{error_n} N at {k}");
             }
-            assert_eq!(single_reading[0].snapshots.len(), instants.len());
+            assert_eq!(single_reading[0].snapshots.len(), instants_s.len());
             let errors = [0, 1, 2].map(|i| largest_differences[i] / largest_values[i]);
             assert!(errors[0] < 1e-9 && errors[1] < 1e-6 && errors[2] < 1e-4, "{errors:?}");
         }

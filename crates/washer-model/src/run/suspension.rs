@@ -7,7 +7,7 @@
 use crate::coordinates::{STATES, TUB_COORDINATES, TUB_Y, TUB_Z};
 use crate::lanes::ToDual as _;
 use crate::machine::feet::LOAD_COMPONENTS;
-use crate::nonlinear::elements::{CabinetLine, Ends, ForceLaw, PointMotion, TubMotion};
+use crate::nonlinear::elements::{CabinetLine, ElementEnds, ForceLaw, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::run::model::{LaneModel, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
@@ -16,27 +16,27 @@ use std::borrow::Cow;
 
 /// The forces of the suspension at an instant.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Forces {
+pub struct SuspensionForces {
     /// The tension of each spring (N), negative under compression.
-    pub springs_n: Vec<f64>,
+    pub spring_tensions_n: Vec<f64>,
     /// The tension of each damper (N), positive while the damper lengthens.
-    pub dampers_n: Vec<f64>,
+    pub damper_tensions_n: Vec<f64>,
     /// The force of each stop (N), along the direction from the tub.
-    pub stops_n: Vec<f64>,
+    pub stop_forces_n: Vec<f64>,
     /// The force of each bushing on the cabinet (N), along c1, c2 and c3.
-    pub bushings_n: Vec<[f64; 3]>,
+    pub bushing_forces_n: Vec<[f64; 3]>,
     /// The sum of all forces on the cabinet (N), along c1, c2 and c3: the weight at rest.
-    pub cabinet_n: [f64; 3],
+    pub cabinet_force_n: [f64; 3],
     /// The vertical load of each foot (N), negative where the foot would lift; empty without a
     /// cabinet.
-    pub feet_n: Vec<f64>,
+    pub foot_loads_n: Vec<f64>,
     /// The margin of the cabinet against slipping (N); absent without a cabinet.
     pub slip_margin_n: Option<f64>,
     /// The margin of the cabinet against walking (N); absent without a cabinet.
     pub walk_margin_n: Option<f64>,
 }
 
-impl Forces {
+impl SuspensionForces {
     /// The kinds of elements: the name, the name of the force, its description, and the number of
     /// components, which is appended to the description of more than one.
     pub const ELEMENT_KINDS: [(&str, &str, &str, usize); 4] = [
@@ -48,13 +48,22 @@ impl Forces {
 
     /// Returns the forces of all elements of each kind.
     pub fn by_kind(&self) -> [&[f64]; Self::ELEMENT_KINDS.len()] {
-        [&self.springs_n, &self.dampers_n, &self.stops_n, self.bushings_n.as_flattened()]
+        [
+            &self.spring_tensions_n,
+            &self.damper_tensions_n,
+            &self.stop_forces_n,
+            self.bushing_forces_n.as_flattened(),
+        ]
     }
 }
 
 /// Computes the forces at a state: coordinates of the nonlinear model, deviations from equilibrium
 /// of the linear one.
-pub(crate) fn compute_forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
+pub(crate) fn compute_forces(
+    point: &Point,
+    model: ModelKind,
+    state: &[f64; STATES],
+) -> SuspensionForces {
     let elements = match model {
         ModelKind::Nonlinear => Cow::Borrowed(&point.machine.elements),
         ModelKind::Linear => Cow::Owned(point.machine.elements.with_viscous_friction()),
@@ -69,45 +78,46 @@ pub(crate) fn compute_forces(point: &Point, model: ModelKind, state: &[f64; STAT
         coordinates_over_time: dual_coordinates(&q, &u),
         deviating_coordinates: dual_coordinates(&q, &core::array::from_fn(|i| state[i])),
     };
-    let mut forces = Forces::default();
+    let mut forces = SuspensionForces::default();
     // The components of a spring's and of a damper's force are products and quotients in different
     // orders. A common order would change the last bits of stored results.
     for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
         let force_per_length = tension / line.length;
         for k in 0..3 {
-            forces.cabinet_n[k] += first_order_value(model, (force_per_length * line.span[k]).v());
+            forces.cabinet_force_n[k] +=
+                first_order_value(model, (force_per_length * line.span[k]).v());
         }
-        forces.springs_n.push(first_order_value(model, tension));
+        forces.spring_tensions_n.push(first_order_value(model, tension));
     }
     for damper in &elements.dampers {
         let (tension, line) = tub.tension(&damper.constant());
         let tension = first_order_value(model, tension);
         for k in 0..3 {
-            forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
+            forces.cabinet_force_n[k] += tension * line.span[k].0.value / line.length.0.value;
         }
-        forces.dampers_n.push(tension);
+        forces.damper_tensions_n.push(tension);
     }
     for stop in &elements.stops {
         let stop = stop.constant();
-        let force_n = first_order_value(model, stop.force(&tub.point_motion(&stop.tub)));
+        let force_n = first_order_value(model, stop.force(&tub.point_motion(&stop.tub_point)));
         for k in 0..3 {
-            forces.cabinet_n[k] += force_n * stop.direction[k].0.value;
+            forces.cabinet_force_n[k] += force_n * stop.direction[k].0.value;
         }
-        forces.stops_n.push(force_n);
+        forces.stop_forces_n.push(force_n);
     }
     for bushing in &elements.bushings {
         let bushing = bushing.constant();
-        let tub_load = bushing.force(&tub.point_motion(&bushing.tub));
+        let tub_load = bushing.force(&tub.point_motion(&bushing.tub_point));
         let force = tub_load.map(|force| first_order_value(model, -force));
         for k in 0..3 {
-            forces.cabinet_n[k] += force[k];
+            forces.cabinet_force_n[k] += force[k];
         }
-        forces.bushings_n.push(force);
+        forces.bushing_forces_n.push(force);
     }
     if let Some(feet) = &point.feet {
         let load = load_on_cabinet(point, model, state);
-        forces.feet_n = feet.loads_n(&load);
+        forces.foot_loads_n = feet.loads_n(&load);
         forces.slip_margin_n = Some(feet.slip_margin_n(&load));
         forces.walk_margin_n = Some(feet.walk_margin_n(&load));
     }
@@ -167,17 +177,21 @@ pub(crate) fn load_on_cabinet(
 }
 
 /// Computes the force of each stop (N) at equilibrium.
-pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
-    compute_forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as LaneModel<f64>>::at_rest(point))
-        .stops_n
+pub fn stop_forces_at_rest_n(point: &Point) -> Vec<f64> {
+    compute_forces(
+        point,
+        ModelKind::Nonlinear,
+        &<Nonlinear<f64> as LaneModel<f64>>::rest_state(point),
+    )
+    .stop_forces_n
 }
 
 /// Computes the speed along each damper (m/s) in the linear model, at deviations from equilibrium.
 pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
     let elements = point.machine.elements.constant();
     let tub = tub_with_deviation(point, deviations);
-    let speed = |number| elements.damper_motion(number, &tub)[1].0.slope;
-    (0..elements.dampers.len()).map(speed).collect()
+    let damper_speed = |number| elements.damper_motion(number, &tub)[1].0.slope;
+    (0..elements.dampers.len()).map(damper_speed).collect()
 }
 
 /// Computes the vectors from cabinet end to tub end (m) of each spring and of each damper at
@@ -185,7 +199,7 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
 pub(crate) fn attachment_vectors(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
     let q = q.map(N);
     let tilt = Tilt::tub(&q);
-    let span = |ends: &Ends<f64>| tilted_span(&tilt, &q, ends).map(|x| x.0);
+    let span = |ends: &ElementEnds<f64>| tilted_span(&tilt, &q, ends).map(|x| x.0);
     let elements = &point.machine.elements;
     [
         elements.springs.iter().map(|spring| span(&spring.ends)).collect(),
@@ -218,7 +232,7 @@ impl TubState {
 
     /// Computes the motion of a tub point.
     fn point_motion(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
-        let both_ends = Ends { cabinet: *tub, tub: *tub };
+        let both_ends = ElementEnds { cabinet_end: *tub, tub_end: *tub };
         PointMotion {
             displacement: dual_span(&self.deviating_coordinates, &both_ends),
             velocity: dual_span(&self.coordinates_over_time, &both_ends)
@@ -254,16 +268,16 @@ fn dual_coordinates(
 }
 
 /// Computes the vector from the cabinet end to the tub end at coordinates, in cabinet axes.
-fn dual_span(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
+fn dual_span(q: &[N<Dual<f64>>; COORDINATES], ends: &ElementEnds<Dual<f64>>) -> Vec3<Dual<f64>> {
     tilted_span(&Tilt::tub(q), q, ends)
 }
 
 /// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
-fn tilted_span<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
-    let tub = tilt.rotate_to_cabinet(&ends.tub);
+fn tilted_span<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &ElementEnds<T>) -> Vec3<T> {
+    let tub = tilt.rotate_to_cabinet(&ends.tub_end);
     [
-        tub[0] - ends.cabinet[0],
-        tub[1] + q[TUB_Y] - ends.cabinet[1],
-        tub[2] + q[TUB_Z] - ends.cabinet[2],
+        tub[0] - ends.cabinet_end[0],
+        tub[1] + q[TUB_Y] - ends.cabinet_end[1],
+        tub[2] + q[TUB_Z] - ends.cabinet_end[2],
     ]
 }

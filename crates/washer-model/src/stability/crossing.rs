@@ -58,7 +58,7 @@ pub fn follow_crossings(
     step_s: f64,
     crossings: &[Crossing<'_>],
 ) -> Vec<Result<CrossingEffect, LeftRangeError>> {
-    let start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
+    let start = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
     let mut current_s = 0.0;
     let mut state = start;
     let mut failure = None;
@@ -113,7 +113,7 @@ pub fn peaks_without_departures(
     crossings: &[Crossing<'_>],
     window_s: [f64; 2],
 ) -> Result<[f64; CHANNELS], LeftRangeError> {
-    let mut state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
+    let mut state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
     let mut time_s = 0.0;
     let mut peaks = [0.0_f64; CHANNELS];
     let mut integrate_to = |to_s: f64, state: &mut [f64; STATES]| {

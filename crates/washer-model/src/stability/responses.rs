@@ -592,7 +592,7 @@ fn find_changed_by_caps(
 
 /// Returns the linear model's response as a guess, or the machine at rest if there is none.
 fn guess_from_linear(point: &Point, linear_response: &LinearResponse) -> Guess {
-    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
+    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
     let has_response = linear_response.state.iter().all(|x| x.is_finite());
     let deviation = |i: usize| if has_response { linear_response.state[i] } else { 0.0 };
     let state = core::array::from_fn(|i| rest_state[i] + deviation(i));

@@ -408,7 +408,7 @@ fn hinge_shift(
         .abs()
         + (1.0 - BACKWARD_WHIRL_RATIO) * frequency_rad_per_s * speed_rad_per_s;
     let cap_ratio = shift_rad2_per_s2 / (cap_rad_per_s * cap_rad_per_s);
-    FREE_MOTION_SHARE * 0.5 * mode.hinge_share(point) * frequency_rad_per_s * cap_ratio
+    FREE_MOTION_SHARE * 0.5 * mode.hinge_energy_share(point) * frequency_rad_per_s * cap_ratio
 }
 
 /// Returns the greatest shift of the suspension's modes by caps, in the complex plane.

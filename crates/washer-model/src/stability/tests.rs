@@ -12,7 +12,8 @@ use crate::coordinates::COORDINATES;
 use crate::steps::SUSPENSION_MODES;
 use crate::tests::reference::read_reference;
 use crate::{
-    BumpStop, Channel, InitialDeviation, Machine, Method, ModelKind, Spin, Timing, history, prepare,
+    BumpStop, Channel, InitialDeviation, Machine, Method, ModelKind, Spin, Timing,
+    integrate_history, prepare,
 };
 use faer::{Mat, c64};
 use lane_ode::{Cancel, Simd};
@@ -233,10 +234,10 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
     }
     let turn_s = 60.0 / speed_rpm;
     let method = Method::rk4(step_s);
-    let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
+    let history = integrate_history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
     let turn_count = (TIMING.end_s.min(end_s) / turn_s) as usize;
     let states: Vec<[f64; COORDINATES]> =
-        (0..turn_count).map(|k| history.instant(k).unwrap().deviations).collect();
+        (0..turn_count).map(|k| history.instant_outputs(k).unwrap().deviations).collect();
     states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect()
 }
 

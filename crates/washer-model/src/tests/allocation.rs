@@ -25,7 +25,7 @@ fn a_long_trajectory_allocates_no_more_than_a_short_one() {
             steps = simulate_with(simd, model, method, &points, recorders)
                 .0
                 .iter()
-                .map(|r| r.steps)
+                .map(|r| r.accepted_steps)
                 .sum();
         });
         (heap.count_total, steps)

@@ -5,11 +5,12 @@ use super::instruments::{
 };
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::elements::Elements;
 use crate::nonlinear::elements::TubMotion;
 use crate::{
-    Damper, InitialDeviation, Machine, Method, ModelKind, Point, Spin, Unbalance, history, simulate,
+    Damper, InitialDeviation, Machine, Method, ModelKind, Point, Spin, Unbalance,
+    integrate_history, simulate,
 };
 use lane_ode::{Dual, N, Real, Simd};
 
@@ -58,7 +59,7 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
             |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| random(size)) };
         let [q, u, a] = [vector(0.05), vector(0.5), vector(20.0)];
         let residual = |machine: &Machine| {
-            let coefficients = Coefficients::new(machine);
+            let coefficients = MachineCoefficients::new(machine);
             let [inertia, force] = equations(&coefficients, &spin, &q.map(N), &u.map(N), &a.map(N));
             let residual: [f64; COORDINATES] = core::array::from_fn(|i| (inertia[i] - force[i]).0);
             residual
@@ -116,9 +117,14 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
         let spin = Spin::Table { time_s: vec![0.0, 2.0], speed_rpm: vec![0.0, rpm] };
         let point = prepare_point(machine.clone(), spin, 2.0);
         let method = Method::rk4(2e-4);
-        let history =
-            history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.1);
-        (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
+        let history = integrate_history(
+            ModelKind::Nonlinear,
+            &method,
+            &point,
+            &InitialDeviation::default(),
+            0.1,
+        );
+        (0..history.len()).map(|k| history.instant_outputs(k).unwrap().deviations).collect()
     };
     let [forwards, mirrored] =
         [simulate_deviations(&machine, 300.0), simulate_deviations(&machine.mirrored(), -300.0)];

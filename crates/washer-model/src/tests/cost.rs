@@ -146,7 +146,7 @@ fn count_evaluation<M: LaneModel<CountingNumber>, P: LaneModel<f64>>(
         &point,
         Coupling::new(N(CountingNumber(0.0)), caps.as_ref()),
     );
-    let mut x = P::at_rest(&point);
+    let mut x = P::rest_state(&point);
     for (i, x) in x.iter_mut().enumerate() {
         *x += 1e-4 * i as f64;
     }

@@ -6,7 +6,7 @@ use super::reference::read_reference;
 use crate::coordinates::COORDINATES;
 use crate::{
     BumpStop, Bushing, Channel, Damper, InitialDeviation, Machine, Method, ModelKind, Point,
-    Profile, Spin, Spring, Unbalance, history, simulate,
+    Profile, Spin, Spring, Unbalance, integrate_history, simulate,
 };
 use core::f64::consts::PI;
 use lane_ode::{Simd, Tolerance};
@@ -105,14 +105,19 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
     let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
     assert_eq!((names[0], channels.len()), ("time_s", 6));
     methods.map(|method| {
-        let history =
-            history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), 0.01);
+        let history = integrate_history(
+            ModelKind::Nonlinear,
+            &method,
+            &point,
+            &InitialDeviation::default(),
+            0.01,
+        );
         assert_eq!(history.len(), rows.len());
         let mut max_error = 0.0_f64;
         for (column, channel) in channels.iter().enumerate() {
             let peak = rows.iter().fold(0.0_f64, |peak, row| peak.max(row[column + 1].abs()));
             for (k, row) in rows.iter().enumerate() {
-                let computed = history.instant(k).unwrap().channels[channel.index()];
+                let computed = history.instant_outputs(k).unwrap().channels[channel.index()];
                 max_error = max_error.max((computed - row[column + 1]).abs() / peak);
             }
         }
@@ -177,8 +182,8 @@ fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec
     start.deviations[0] = start_m;
     start.deviations[2] = start_m;
     let method = Method::rk4(2e-5);
-    let history = history(ModelKind::Nonlinear, &method, &point, &start, interval_s);
-    (0..history.len()).map(|k| history.instant(k).unwrap().deviations[0]).collect()
+    let history = integrate_history(ModelKind::Nonlinear, &method, &point, &start, interval_s);
+    (0..history.len()).map(|k| history.instant_outputs(k).unwrap().deviations[0]).collect()
 }
 
 #[test]
@@ -348,12 +353,18 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-            history(model, &Method::rk4(1e-4), &point, &start, 0.1).forces(0).unwrap()
+            integrate_history(model, &Method::rk4(1e-4), &point, &start, 0.1).forces(0).unwrap()
         });
-        assert!(nonlinear.stops_n.iter().any(|force_n| *force_n > 100.0), "{nonlinear:?}");
-        let all_forces = |forces: &crate::Forces| {
-            let bushings = forces.bushings_n.concat();
-            [&forces.springs_n[..], &forces.stops_n, &bushings, &forces.cabinet_n].concat()
+        assert!(nonlinear.stop_forces_n.iter().any(|force_n| *force_n > 100.0), "{nonlinear:?}");
+        let all_forces = |forces: &crate::SuspensionForces| {
+            let bushings = forces.bushing_forces_n.concat();
+            [
+                &forces.spring_tensions_n[..],
+                &forces.stop_forces_n,
+                &bushings,
+                &forces.cabinet_force_n,
+            ]
+            .concat()
         };
         let pairs = all_forces(&nonlinear).into_iter().zip(all_forces(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)

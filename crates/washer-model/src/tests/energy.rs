@@ -6,8 +6,8 @@ use super::instruments::{mass_matrix, prepare_point};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
 use crate::machine::{BumpStop, Damper, Machine};
-use crate::nonlinear::coefficients::Coefficients;
-use crate::{InitialDeviation, InstantOutputs, Method, ModelKind, Unbalance, history};
+use crate::nonlinear::coefficients::MachineCoefficients;
+use crate::{InitialDeviation, InstantOutputs, Method, ModelKind, Unbalance, integrate_history};
 use lane_ode::N;
 
 type PlainVector = [f64; 3];
@@ -163,7 +163,11 @@ fn engagement(damper: &Damper, elongation_m: f64) -> f64 {
 }
 
 /// Computes the kinetic energy (J) without spin, u M u / 2.
-fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
+fn kinetic_j(
+    machine: &MachineCoefficients<f64>,
+    q: &[f64; COORDINATES],
+    u: &[f64; COORDINATES],
+) -> f64 {
     let zero_spin = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let mass = mass_matrix(machine, &zero_spin, q);
     let row_sum = |i: usize| (0..COORDINATES).map(|j| u[i] * mass[i][j] * u[j]).sum::<f64>();
@@ -184,9 +188,10 @@ fn history_from_initial_velocity(
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
         (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
     }
-    let history = history(ModelKind::Nonlinear, &Method::rk4(step_s), &point, &start, interval_s);
+    let history =
+        integrate_history(ModelKind::Nonlinear, &Method::rk4(step_s), &point, &start, interval_s);
     let with_full_coordinates = |k| {
-        let mut instant = history.instant(k).unwrap();
+        let mut instant = history.instant_outputs(k).unwrap();
         instant.deviations = std::array::from_fn(|i| point.equilibrium[i] + instant.deviations[i]);
         instant
     };
@@ -199,7 +204,7 @@ fn history_from_initial_velocity(
 fn energies_j(step_s: f64) -> Vec<f64> {
     let mut machine = Machine::paper();
     machine.dampers.clear();
-    let coefficients = Coefficients::new(&machine);
+    let coefficients = MachineCoefficients::new(&machine);
     let instants = history_from_initial_velocity(&machine, 10.0, step_s, 0.05);
     let at_rest = potential_j(&machine, &equilibrium(&machine));
     let energy = |InstantOutputs { deviations: q, speeds: u, .. }: &InstantOutputs| {
@@ -234,7 +239,7 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     machine.dampers[0].free_stroke_softness_m = 1e-3;
     machine.dampers[0].outer_damping_n_s_per_m = 50.0;
     machine.unbalance.angle_deg = 35.0;
-    let coefficients = Coefficients::new(&machine);
+    let coefficients = MachineCoefficients::new(&machine);
     let interval_s = 1e-4;
     let instants = history_from_initial_velocity(&machine, 3.0, interval_s, interval_s);
     let energy = |instant: &InstantOutputs| {

@@ -8,7 +8,7 @@ use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL_COMPONENTS};
+use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates, RADIAL_COMPONENTS};
 use crate::point::Point;
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{Channel, ModelKind, PointEquations, Spin};
@@ -170,7 +170,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let [u, a] = [u, a].map(|v| v.map(|v| dual(0.0, v)));
         let motion = MovingCoordinates { q: dual_q, u, a };
         let bodies = instant.point.machine.bodies.constant();
-        let axes = Axes::new(&instant.spin.constant(), &motion);
+        let axes = BodyAxes::new(&instant.spin.constant(), &motion);
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
         // Channels are deviations from equilibrium; the radial distance is not.

@@ -43,12 +43,12 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
     let points = prepared(&machines);
     let method = Method::rk4(2e-4);
-    let recorders = Recorders::gauge(Gauge::DamperSpeed);
+    let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     let point_references: Vec<&Point> = points.iter().collect();
     let (_, readings) =
         simulate_with(Simd::best(), ModelKind::Linear, &method, &point_references, recorders);
     for ((point, reading), machine) in points.iter().zip(&readings).zip(&machines) {
-        let speeds = reading.gauge(Gauge::DamperSpeed);
+        let speeds = reading.gauge_values(Gauge::DamperSpeed);
         let factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
         assert!(factor < 1.01, "{factor}: {:?} for {reading:?}", point.friction_speeds());
         // The speeds do not depend on the other points.
@@ -74,7 +74,7 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
         machine
     };
     let method = Method::rk4(2e-4);
-    let recorders = Recorders::gauge(Gauge::DamperSpeed);
+    let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     for friction_n in [45.0, 50.0, 55.0] {
         let point = prepared(&[machine_with(None, friction_n)]).remove(0);
         let speeds_m_per_s: Vec<f64> =
@@ -88,7 +88,8 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             let point = prepared(&[machine]).remove(0);
             let (_, readings) =
                 simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point], recorders);
-            let reciprocals = readings[0].gauge(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
+            let reciprocals =
+                readings[0].gauge_values(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
             reciprocals.collect()
         };
         let mut reciprocals: Vec<f64> = speeds_m_per_s.iter().map(|speed| 1.0 / speed).collect();

@@ -2,7 +2,7 @@
 
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::FloatingChain;
 use crate::nonlinear::{Half, Halves, assemble_coupled_halves};
@@ -48,7 +48,8 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
             }
         }
         if machine.violations().is_empty()
-            && equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine)).1 & 1 == 1
+            && equilibrium::solve_equilibrium(N(0.0), &MachineCoefficients::new(&machine)).1 & 1
+                == 1
         {
             return machine;
         }
@@ -128,7 +129,7 @@ pub(super) fn loaded_equations<T: Real>(
 
 /// Computes M(q, theta) a and f(q, u, theta, theta', theta'') of the nonlinear equations M a = f.
 pub(super) fn equations<T: Lane>(
-    machine: &Coefficients<T>,
+    machine: &MachineCoefficients<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
@@ -139,7 +140,7 @@ pub(super) fn equations<T: Lane>(
 
 /// Computes the mass matrix of the nonlinear model by columns from unit accelerations.
 pub(super) fn mass_matrix(
-    machine: &Coefficients<f64>,
+    machine: &MachineCoefficients<f64>,
     spin: &SpinState<f64>,
     q: &[f64; COORDINATES],
 ) -> [[f64; COORDINATES]; COORDINATES] {

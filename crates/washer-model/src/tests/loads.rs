@@ -7,7 +7,7 @@ use crate::machine::feet::{Feet, LOAD_COMPONENTS};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
     Gauge, InitialDeviation, Method, ModelKind, Point, Profile, Reading, Recorders, Spin, Timing,
-    history, prepare, simulate_with,
+    integrate_history, prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -58,7 +58,7 @@ fn compute_load(
     machine: &Machine,
     point: &Point,
     deviations: &[f64; 10],
-    forces: &crate::Forces,
+    forces: &crate::SuspensionForces,
 ) -> [f64; LOAD_COMPONENTS] {
     let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + deviations[i]);
     let tub = body_axes(q[4], q[5]);
@@ -72,19 +72,21 @@ fn compute_load(
             load[3 + i] += position_m[j] * force[k] - position_m[k] * force[j];
         }
     };
-    let springs = machine.springs.iter().map(|s| (s.cabinet_m, s.tub_m)).zip(&forces.springs_n);
-    let dampers = machine.dampers.iter().map(|d| (d.cabinet_m, d.tub_m)).zip(&forces.dampers_n);
+    let springs =
+        machine.springs.iter().map(|s| (s.cabinet_m, s.tub_m)).zip(&forces.spring_tensions_n);
+    let dampers =
+        machine.dampers.iter().map(|d| (d.cabinet_m, d.tub_m)).zip(&forces.damper_tensions_n);
     for ((cabinet_m, tub_m), tension_n) in springs.chain(dampers) {
         let end = tub_point(tub_m);
         let span: [f64; 3] = std::array::from_fn(|i| end[i] - cabinet_m[i]);
         let length = span.iter().map(|s| s * s).sum::<f64>().sqrt();
         add_force(cabinet_m, span.map(|s| tension_n * s / length));
     }
-    for (stop, force_n) in machine.stops.iter().zip(&forces.stops_n) {
+    for (stop, force_n) in machine.stops.iter().zip(&forces.stop_forces_n) {
         let length = stop.direction_length();
         add_force(tub_point(stop.tub_m), stop.direction.map(|d| force_n * d / length));
     }
-    for (bushing, force_n) in machine.bushings.iter().zip(&forces.bushings_n) {
+    for (bushing, force_n) in machine.bushings.iter().zip(&forces.bushing_forces_n) {
         add_force(tub_point(bushing.tub_m), *force_n);
     }
     load
@@ -101,25 +103,30 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let point = prepare_ramp_point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
     let method = Method::rk4(1e-4);
-    let history =
-        history(ModelKind::Nonlinear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
+    let history = integrate_history(
+        ModelKind::Nonlinear,
+        &method,
+        &point,
+        &InitialDeviation::default(),
+        INTERVAL_S,
+    );
     let [first_instant, last_instant] =
         TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
-    let mut feet_n = vec![f64::INFINITY; 4];
+    let mut foot_loads_n = vec![f64::INFINITY; 4];
     let mut slip_margin_n = f64::INFINITY;
     let mut walk_margin_n = f64::INFINITY;
-    let mut stops_n = vec![0.0_f64; 3];
+    let mut stop_forces_n = vec![0.0_f64; 3];
     let mut contact_s = vec![0.0_f64; 3];
     let mut greatest_tensions_n = vec![0.0_f64; machine.dampers.len()];
     for k in first_instant..=last_instant {
         let forces = history.forces(k).unwrap();
-        let instant = history.instant(k).unwrap();
+        let instant = history.instant_outputs(k).unwrap();
         let load = compute_load(&machine, &point, &instant.deviations, &forces);
         for i in 0..3 {
-            assert!((load[i] - forces.cabinet_n[i]).abs() < 1e-9);
+            assert!((load[i] - forces.cabinet_force_n[i]).abs() < 1e-9);
         }
         let loads_n = feet.loads_n(&load);
-        assert_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
+        assert_close("a history's load of foot", &forces.foot_loads_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
         let slip_margin_now_n = 0.4 * (feet.distribution.cabinet_weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - slip_margin_now_n).abs() < 1e-9);
@@ -141,11 +148,11 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
             slip_margin_now_n - moment.abs() * longest_arm_m / mean_square_arm_m2;
         assert!((forces.walk_margin_n.unwrap() - walk_margin_now_n).abs() < 1e-6);
         walk_margin_n = walk_margin_n.min(walk_margin_now_n);
-        feet_n = minima([feet_n, loads_n].into_iter());
-        for (greatest_n, now_n) in stops_n.iter_mut().zip(&forces.stops_n) {
+        foot_loads_n = minima([foot_loads_n, loads_n].into_iter());
+        for (greatest_n, now_n) in stop_forces_n.iter_mut().zip(&forces.stop_forces_n) {
             *greatest_n = greatest_n.max(*now_n);
         }
-        for (greatest_n, now_n) in greatest_tensions_n.iter_mut().zip(&forces.dampers_n) {
+        for (greatest_n, now_n) in greatest_tensions_n.iter_mut().zip(&forces.damper_tensions_n) {
             *greatest_n = greatest_n.max(now_n.abs());
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
@@ -158,21 +165,26 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         }
     }
     let hit_stops =
-        stops_n.iter().zip(&contact_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
-    assert!(hit_stops.count() >= 2, "{stops_n:?} N, {contact_s:?} s");
+        stop_forces_n.iter().zip(&contact_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
+    assert!(hit_stops.count() >= 2, "{stop_forces_n:?} N, {contact_s:?} s");
     let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
-    assert_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    assert_close("margin", reading.gauge(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
-    assert_close("walking", reading.gauge(Gauge::WalkMargin), &[walk_margin_n], 0.1);
+    assert_close("least load of foot", reading.gauge_values(Gauge::FootLoad), &foot_loads_n, 1e-2);
+    assert_close("margin", reading.gauge_values(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
+    assert_close("walking", reading.gauge_values(Gauge::WalkMargin), &[walk_margin_n], 0.1);
     assert!(
         walk_margin_n < slip_margin_n - 1.0,
         "{walk_margin_n} N, {slip_margin_n} N: this machine turns"
     );
-    let greatest_n = stops_n.iter().copied().fold(0.0, f64::max);
-    assert_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-3 * greatest_n);
+    let greatest_n = stop_forces_n.iter().copied().fold(0.0, f64::max);
+    assert_close(
+        "force of stop",
+        reading.gauge_values(Gauge::StopForce),
+        &stop_forces_n,
+        1e-3 * greatest_n,
+    );
     // A damper's tension increases with its speed, so that both are greatest at the same instant.
     let tensions_n: Vec<f64> = reading
-        .gauge(Gauge::DamperSpeed)
+        .gauge_values(Gauge::DamperSpeed)
         .iter()
         .zip(&machine.dampers)
         .map(|(speed, damper)| {
@@ -187,7 +199,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     // The error of each contact is up to one interval at both ends.
     assert_close(
         "contact of stop",
-        reading.gauge(Gauge::StopContact),
+        reading.gauge_values(Gauge::StopContact),
         &contact_s,
         40.0 * INTERVAL_S,
     );
@@ -200,24 +212,32 @@ fn loads_of_the_linear_model_agree_with_its_history() {
     machine.unbalance.mass_kg = 0.9;
     let point = prepare_ramp_point(machine.clone());
     let method = Method::rk4(1e-4);
-    let history =
-        history(ModelKind::Linear, &method, &point, &InitialDeviation::default(), INTERVAL_S);
+    let history = integrate_history(
+        ModelKind::Linear,
+        &method,
+        &point,
+        &InitialDeviation::default(),
+        INTERVAL_S,
+    );
     let [first_instant, last_instant] =
         TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let forces: Vec<_> =
         (first_instant..=last_instant).map(|k| history.forces(k).unwrap()).collect();
-    let feet_n = minima(forces.iter().map(|forces| forces.feet_n.clone()));
+    let foot_loads_n = minima(forces.iter().map(|forces| forces.foot_loads_n.clone()));
     let slip_margin_n = minima(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
     let negated_stops_n =
-        minima(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
-    let stops_n: Vec<f64> = negated_stops_n.iter().map(|negated_n| -negated_n).collect();
+        minima(forces.iter().map(|forces| forces.stop_forces_n.iter().map(|n| -n).collect()));
+    let stop_forces_n: Vec<f64> = negated_stops_n.iter().map(|negated_n| -negated_n).collect();
     let reading = read_gauges(&point, ModelKind::Linear, Simd::best());
     let at_rest = history.forces(0).unwrap();
-    assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
-    assert_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    assert_close("margin", reading.gauge(Gauge::SlipMargin), &slip_margin_n, 1e-2);
-    assert_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-6);
-    let dampers = machine.dampers.iter().zip(reading.gauge(Gauge::DamperSpeed));
+    assert!(
+        at_rest.foot_loads_n.iter().zip(&foot_loads_n).all(|(rest_n, n)| rest_n - n > 10.0),
+        "{foot_loads_n:?}"
+    );
+    assert_close("least load of foot", reading.gauge_values(Gauge::FootLoad), &foot_loads_n, 1e-2);
+    assert_close("margin", reading.gauge_values(Gauge::SlipMargin), &slip_margin_n, 1e-2);
+    assert_close("force of stop", reading.gauge_values(Gauge::StopForce), &stop_forces_n, 1e-6);
+    let dampers = machine.dampers.iter().zip(reading.gauge_values(Gauge::DamperSpeed));
     let tensions_n: Vec<f64> = dampers
         .map(|(damper, speed)| {
             let linear_speed = damper.friction_linear_speed_m_per_s.unwrap_or(f64::INFINITY);
@@ -225,8 +245,9 @@ fn loads_of_the_linear_model_agree_with_its_history() {
             (damper.damping_n_s_per_m + equivalent) * speed
         })
         .collect();
-    let negated_tensions_n =
-        minima(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
+    let negated_tensions_n = minima(
+        forces.iter().map(|forces| forces.damper_tensions_n.iter().map(|n| -n.abs()).collect()),
+    );
     let greatest_tensions_n: Vec<f64> = negated_tensions_n.iter().map(|n| -n).collect();
     assert!(greatest_tensions_n.iter().all(|n| *n > 1.0), "{greatest_tensions_n:?}");
     let quantity = "tension at the greatest speed of damper";
@@ -244,7 +265,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
     machine.further_unbalances.clear();
     let point = prepare_ramp_point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
-    let history = history(
+    let history = integrate_history(
         ModelKind::Nonlinear,
         &Method::rk4(1e-4),
         &point,
@@ -256,7 +277,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
         let reading = read_gauges(&point, model, Simd::best());
         min_rest_load_n
-            - reading.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
+            - reading.gauge_values(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
     });
     assert!(nonlinear > 0.01, "{nonlinear} N");
     assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");

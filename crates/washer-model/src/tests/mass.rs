@@ -3,7 +3,7 @@
 use super::instruments::{equations, loaded_equations, mass_matrix, random_machine};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::frame::Tilt;
@@ -15,8 +15,11 @@ use lane_ode::{Dual, N};
 fn val_mass_matrix_matches_that_of_an_independent_program() {
     let mut max_error = 0.0_f64;
     for case in read_reference("rhs.json")["cases"].as_array().unwrap() {
-        let computed =
-            mass_matrix(&Coefficients::new(&machine(case)), &spin(case), &read_numbers(&case["q"]));
+        let computed = mass_matrix(
+            &MachineCoefficients::new(&machine(case)),
+            &spin(case),
+            &read_numbers(&case["q"]),
+        );
         max_error = max_error.max(assert_matrix("M", &computed, &case["mass_matrix"], 1e-14));
     }
     eprintln!("mass matrix: at most {max_error:.1e} of the largest entry");
@@ -25,11 +28,11 @@ fn val_mass_matrix_matches_that_of_an_independent_program() {
 /// Calls `check` with random states of random machines, at small deflections of the bearings.
 fn check_random_states(
     seed: u64,
-    mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &LaneVector, &LaneVector),
+    mut check: impl FnMut(&MachineCoefficients<f64>, &SpinState<f64>, &LaneVector, &LaneVector),
 ) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for _ in 0..200 {
-        let coefficients = Coefficients::new(&random_machine(&mut rng));
+        let coefficients = MachineCoefficients::new(&random_machine(&mut rng));
         let mut random = |size: f64| N(size * (2.0 * rng.f64() - 1.0));
         let spin = SpinState::new(random(40.0).sin_cos(), random(130.0), random(10.0));
         let mut q: LaneVector = core::array::from_fn(|_| random(0.05));
@@ -63,7 +66,7 @@ fn accelerations_solve_the_equations_of_motion_of_any_machine() {
 /// Returns an arbitrary sag; mass scaling is correct for any sag.
 fn sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
-    Sag { bearings, hinge_angles: [N(2e-4), N(-7e-4)] }
+    Sag { bearing_deflection: bearings, hinge_angles: [N(2e-4), N(-7e-4)] }
 }
 
 #[test]
@@ -90,7 +93,7 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
                 };
                 [component(0), component(1)]
             };
-            let Deflection { offset, tilt } = sag.bearings;
+            let Deflection { offset, tilt } = sag.bearing_deflection;
             let deflection = Deflection {
                 offset: mass_scaled_deflection(d.offset, offset),
                 tilt: mass_scaled_deflection(d.tilt, tilt),

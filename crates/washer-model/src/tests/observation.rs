@@ -21,7 +21,7 @@ fn derivative_errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
         let model = M::splat(N(0.0), &point, Coupling::Springs);
         let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
         let middle_s = 0.2 + random(0.1);
-        let state_at_rest = M::at_rest(&point);
+        let state_at_rest = M::rest_state(&point);
         let q: [f64; COORDINATES] = core::array::from_fn(|i| state_at_rest[i] + random(0.03));
         let u: [f64; COORDINATES] = core::array::from_fn(|_| random(0.5));
         let a: [f64; COORDINATES] = core::array::from_fn(|_| random(20.0));

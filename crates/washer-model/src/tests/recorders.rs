@@ -4,7 +4,7 @@ use super::instruments::{ALL_RECORDERS, paper_machine};
 use crate::machine::spin::turn_division_times_s;
 use crate::{
     Caps, Channel, Gauge, InitialDeviation, Machine, Method, MethodKind, ModelKind, Point, Profile,
-    Recorders, Spin, Timing, history, prepare, simulate, simulate_with,
+    Recorders, Spin, Timing, integrate_history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -29,7 +29,7 @@ struct SampledReadings {
 }
 
 fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
-    let history = history(model, method, point, &InitialDeviation::default(), INTERVAL_S);
+    let history = integrate_history(model, method, point, &InitialDeviation::default(), INTERVAL_S);
     let turn_boundaries_s = turn_division_times_s(&point.spin_segments, TIMING.window_s);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let mut readings = SampledReadings {
@@ -41,7 +41,7 @@ fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledR
     for k in first..=last {
         // The weight of the trapezoidal rule.
         let weight = if k == first || k == last { 0.5 * INTERVAL_S } else { INTERVAL_S };
-        let instant = history.instant(k).unwrap();
+        let instant = history.instant_outputs(k).unwrap();
         let turn =
             turn_boundaries_s.partition_point(|boundary_s| *boundary_s < k as f64 * INTERVAL_S);
         for (i, y) in instant.channels.into_iter().enumerate() {
@@ -49,7 +49,7 @@ fn sample_readings(point: &Point, model: ModelKind, method: &Method) -> SampledR
             readings.turns[turn][i] = readings.turns[turn][i].max(y.abs());
         }
         let force_n =
-            history.forces(k).unwrap().cabinet_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+            history.forces(k).unwrap().cabinet_force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
         readings.cabinet_force_n = readings.cabinet_force_n.max(force_n);
         readings.clash_time_s += if instant.gap_m < 0.0 { weight } else { 0.0 };
     }
@@ -103,11 +103,11 @@ fn readings_agree_with_densely_sampled_histories() {
         }
         assert_close(
             "force",
-            reading.gauge(Gauge::CabinetForce)[0],
+            reading.gauge_values(Gauge::CabinetForce)[0],
             expected.cabinet_force_n,
             1e-4,
         );
-        let clash_s = reading.gauge(Gauge::ClashTime)[0];
+        let clash_s = reading.gauge_values(Gauge::ClashTime)[0];
         assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
         // The error of each overlap is at most one interval.
         let clash_error_s = (clash_s - expected.clash_time_s).abs();
@@ -144,14 +144,14 @@ fn readings_do_not_depend_on_the_method() {
             }
             assert_close(
                 "force",
-                reading.gauge(Gauge::CabinetForce)[0],
-                reference.gauge(Gauge::CabinetForce)[0],
+                reading.gauge_values(Gauge::CabinetForce)[0],
+                reference.gauge_values(Gauge::CabinetForce)[0],
                 1e-4,
             );
             assert_close(
                 "clash",
-                reading.gauge(Gauge::ClashTime)[0],
-                reference.gauge(Gauge::ClashTime)[0],
+                reading.gauge_values(Gauge::ClashTime)[0],
+                reference.gauge_values(Gauge::ClashTime)[0],
                 1e-3,
             );
         }
@@ -167,7 +167,7 @@ fn recorders_that_are_not_in_use_leave_no_readings() {
         simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], recorders)
     };
     assert!(run(Recorders::default()).1.is_empty());
-    let (_, readings) = run(Recorders::gauge(Gauge::ClashTime));
+    let (_, readings) = run(Recorders::with_gauge(Gauge::ClashTime));
     assert_eq!(readings.len(), 2);
     for reading in readings {
         assert!(reading.root_mean_squares.is_none() && reading.turns.is_empty());
@@ -189,8 +189,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
         let (_, readings) =
             simulate_with(Simd::best(), model, &Method::rk4(2e-4), &[&point], ALL_RECORDERS);
         // The springs also have a small force along c1, which the model's constraint balances.
-        assert_close("force", readings[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
-        assert_eq!(readings[0].gauge(Gauge::ClashTime), [0.0]);
+        assert_close("force", readings[0].gauge_values(Gauge::CabinetForce)[0], weight_n, 1e-4);
+        assert_eq!(readings[0].gauge_values(Gauge::ClashTime), [0.0]);
         assert_eq!(readings[0].turns.len(), 1);
     }
 }

@@ -6,7 +6,7 @@ use crate::linear;
 use crate::machine::Machine;
 use crate::machine::spin::SpinState;
 use crate::nonlinear;
-use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::equilibrium;
 use crate::{
@@ -73,7 +73,7 @@ pub(crate) fn spin(case: &Value) -> SpinState<f64> {
 #[test]
 fn val_accelerations_match_an_independent_right_hand_side() {
     for case in read_reference("rhs.json")["cases"].as_array().unwrap() {
-        let coefficients = Coefficients::new(&machine(case));
+        let coefficients = MachineCoefficients::new(&machine(case));
         let [q, u] = ["q", "u"].map(|name| read_numbers::<COORDINATES>(&case[name]).map(N));
         let computed = nonlinear::accelerations(
             &coefficients,
@@ -102,7 +102,7 @@ fn val_accelerations_match_an_independent_right_hand_side() {
 fn val_equilibrium_matches_an_independent_solution() {
     for case in read_reference("equilibrium.json")["cases"].as_array().unwrap() {
         let (q, solved_lanes) =
-            equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine(case)));
+            equilibrium::solve_equilibrium(N(0.0), &MachineCoefficients::new(&machine(case)));
         assert_eq!(solved_lanes & 1, 1);
         let expected: [f64; COORDINATES] = read_numbers(&case["q"]);
         for i in 0..COORDINATES {
@@ -120,7 +120,7 @@ fn val_equilibrium_matches_an_independent_solution() {
 #[test]
 fn val_linear_matrices_match_an_independent_expansion() {
     for case in read_reference("linear_matrices.json")["cases"].as_array().unwrap() {
-        let coefficients = Coefficients::new(&machine(case));
+        let coefficients = MachineCoefficients::new(&machine(case));
         let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
         let point = linear::Linearisation { machine: &coefficients, q: &q }.run().remove(0);
         let computed = point.matrices(&coefficients.bodies, &spin(case));

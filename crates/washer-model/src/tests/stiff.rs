@@ -43,7 +43,7 @@ fn the_additive_method_agrees_with_converged_rk4() {
         for (relative, max_error) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
             let record = simulate_point(model, &Method::additive(tolerance(relative)), &point);
             let error = difference(&record, &reference);
-            eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.steps);
+            eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.accepted_steps);
             assert!(error < max_error, "{model:?} at {relative:e}: {error:e}");
         }
     }
@@ -60,7 +60,7 @@ fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
             assert!(simulate_point(model, &Method::rk4(5e-5), stiff_point).failure.is_some());
             let record = simulate_point(model, &Method::additive(tolerance(1e-4)), stiff_point);
             let error = difference(&record, &reference);
-            let attempted_steps = record.steps + record.rejected;
+            let attempted_steps = record.accepted_steps + record.rejected_steps;
             eprintln!("{model:?}: {error:.1e} in {attempted_steps} steps");
             assert!(error < 5e-4, "{model:?}: {error:e}");
             // An explicit method of order 5 needs 3e5 and 1e7 steps.

@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use lane_ode::Simd;
 use std::sync::OnceLock;
 
-fn point(machine: Machine) -> Point {
+fn prepare_point(machine: Machine) -> Point {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 1200.0, ramp_s: 20.0 };
     let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
@@ -17,8 +17,8 @@ fn point(machine: Machine) -> Point {
 fn paper_modes() -> &'static [ModeOverSpeed] {
     static MODES: OnceLock<Vec<ModeOverSpeed>> = OnceLock::new();
     MODES.get_or_init(|| {
-        let speeds: Vec<f64> = (0..=24).map(|k| 50.0 * f64::from(k)).collect();
-        campbell(&point(Machine::paper()), &speeds).unwrap()
+        let speeds_rpm: Vec<f64> = (0..=24).map(|k| 50.0 * f64::from(k)).collect();
+        campbell(&prepare_point(Machine::paper()), &speeds_rpm).unwrap()
     })
 }
 
@@ -67,15 +67,15 @@ fn loaded_springs_at_the_tabulated_positions_do_not_give_the_papers_resonances()
     let weight_n = mass_kg * machine.gravity_m_per_s2;
     for (k, spring) in machine.springs.iter_mut().enumerate() {
         let other_x_m = if k < 2 { rear_x_m } else { front_x_m };
-        let share = (centre_x_m - other_x_m) / (spring.tub_m[0] - other_x_m);
-        let upwards = (spring.cabinet_m[1] - spring.tub_m[1]) / spring.given_length_m();
-        let tension_n = 0.5 * share * weight_n / upwards;
+        let load_share = (centre_x_m - other_x_m) / (spring.tub_m[0] - other_x_m);
+        let upward_component = (spring.cabinet_m[1] - spring.tub_m[1]) / spring.given_length_m();
+        let tension_n = 0.5 * load_share * weight_n / upward_component;
         spring.free_length_m = Some(spring.given_length_m() - tension_n / spring.stiffness_n_per_m);
     }
-    let point = point(machine);
+    let point = prepare_point(machine);
     assert!(point.equilibrium()[0].abs() < 1e-6 && point.static_sag_m().abs() < 1e-6);
-    let speeds: Vec<f64> = (0..=12).map(|k| 25.0 * f64::from(k)).collect();
-    let modes = campbell(&point, &speeds).unwrap();
+    let speeds_rpm: Vec<f64> = (0..=12).map(|k| 25.0 * f64::from(k)).collect();
+    let modes = campbell(&point, &speeds_rpm).unwrap();
     for (mode, (paper, expected)) in
         modes.iter().zip([(99.9, 104.96), (147.6, 146.46), (162.3, 173.26), (261.6, 255.49)])
     {
@@ -91,7 +91,7 @@ fn loaded_springs_at_the_tabulated_positions_do_not_give_the_papers_resonances()
 
 /// Returns half the range of the frequency over a turn, relative to the mean.
 fn relative_variation(mode: &ModeAtSpeed) -> f64 {
-    0.5 * (mode.greatest_rpm - mode.least_rpm) / mode.frequency_rpm
+    0.5 * (mode.max_frequency_rpm - mode.min_frequency_rpm) / mode.frequency_rpm
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn val_frequencies_hardly_vary_over_a_turn() {
     // The paper gives a variation of less than 0.3 % up to 1200 rpm. The first mode at 1200 rpm
     // exceeds it slightly.
     for (k, mode) in paper_modes()[..4].iter().enumerate() {
-        for (mode_at_speed, step) in mode.at_speed.iter().zip(0..) {
+        for (mode_at_speed, step) in mode.modes_at_speeds.iter().zip(0..) {
             let speed = 50 * step;
             if (k, speed) == (0, 1200) {
                 assert!(
@@ -118,16 +118,16 @@ fn val_frequencies_hardly_vary_over_a_turn() {
         }
     }
     // Without dampers the variation of all modes is below 0.3 %.
-    let mut undamped = Machine::paper();
-    for damper in &mut undamped.dampers {
+    let mut undamped_machine = Machine::paper();
+    for damper in &mut undamped_machine.dampers {
         damper.damping_n_s_per_m = 0.0;
     }
-    for mode in &campbell(&point(undamped), &[1200.0]).unwrap()[..4] {
+    for mode in &campbell(&prepare_point(undamped_machine), &[1200.0]).unwrap()[..4] {
         assert!(
-            relative_variation(&mode.at_speed[0]) < 2.97e-3,
+            relative_variation(&mode.modes_at_speeds[0]) < 2.97e-3,
             "{}: {}",
             mode.motion,
-            relative_variation(&mode.at_speed[0])
+            relative_variation(&mode.modes_at_speeds[0])
         );
     }
 }
@@ -137,24 +137,31 @@ fn modes_are_followed_through_crossings() {
     let modes = paper_modes();
     // The frequency of pitch crosses that of the horizontal translation, whose damping ratio is
     // several times as great.
-    let pitch = &modes[1].at_speed;
-    let sway = &modes[2].at_speed;
-    assert!(pitch[0].frequency_rpm < sway[0].frequency_rpm);
-    assert!(pitch[24].frequency_rpm > sway[24].frequency_rpm + 50.0);
+    let pitch_modes = &modes[1].modes_at_speeds;
+    let sway_modes = &modes[2].modes_at_speeds;
+    assert!(pitch_modes[0].frequency_rpm < sway_modes[0].frequency_rpm);
+    assert!(pitch_modes[24].frequency_rpm > sway_modes[24].frequency_rpm + 50.0);
     for k in 0..25 {
-        assert!(pitch[k].damping_ratio < 0.03 && sway[k].damping_ratio > 0.1, "at step {k}");
+        assert!(
+            pitch_modes[k].damping_ratio < 0.03 && sway_modes[k].damping_ratio > 0.1,
+            "at step {k}"
+        );
     }
     for mode in modes {
-        for pair in mode.at_speed.windows(2) {
-            let jump = (pair[1].frequency_rpm - pair[0].frequency_rpm).abs();
-            assert!(jump < 60.0, "{}: {jump} rpm from one speed to the next", mode.motion);
+        for pair in mode.modes_at_speeds.windows(2) {
+            let frequency_jump_rpm = (pair[1].frequency_rpm - pair[0].frequency_rpm).abs();
+            assert!(
+                frequency_jump_rpm < 60.0,
+                "{}: {frequency_jump_rpm} rpm from one speed to the next",
+                mode.motion
+            );
         }
     }
 }
 
 #[test]
 fn a_mode_solves_the_equations_of_motion() {
-    let point = point(Machine::paper());
+    let point = prepare_point(Machine::paper());
     let speed = 900.0 * TAU / 60.0;
     let matrices = point.matrices(1.0, speed, 0.0);
     for mode in modes(&point, 1.0, speed).unwrap().modes {
@@ -165,7 +172,7 @@ fn a_mode_solves_the_equations_of_motion() {
         let square_im = 2.0 * re * im;
         for i in 0..10 {
             let mut residual = [0.0; 2];
-            let mut size = 0.0;
+            let mut stiffness_term_sum = 0.0;
             for j in 0..10 {
                 let m = matrices.mass[i][j];
                 let c = matrices.damping[i][j];
@@ -175,10 +182,10 @@ fn a_mode_solves_the_equations_of_motion() {
                 let [x, y] = mode.shape[j];
                 residual[0] += a * x - b * y;
                 residual[1] += a * y + b * x;
-                size += k.abs() * x.hypot(y);
+                stiffness_term_sum += k.abs() * x.hypot(y);
             }
             let residual = residual[0].hypot(residual[1]);
-            assert!(residual < 1e-9 * size, "row {i} of the mode at {im} rad/s");
+            assert!(residual < 1e-9 * stiffness_term_sum, "row {i} of the mode at {im} rad/s");
         }
     }
 }
@@ -187,12 +194,16 @@ fn a_mode_solves_the_equations_of_motion() {
 fn an_overdamped_machine_has_ten_modes() {
     let mut machine = Machine::paper();
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3000.0);
-    let modes = campbell(&point(machine), &[0.0, 100.0, 200.0]).unwrap();
+    let modes = campbell(&prepare_point(machine), &[0.0, 100.0, 200.0]).unwrap();
     assert_eq!(modes.len(), 10);
-    let overdamped: Vec<_> =
-        modes.iter().filter(|mode| mode.at_speed[0].frequency_rpm == 0.0).collect();
-    assert!(!overdamped.is_empty());
-    for mode in overdamped {
-        assert!(mode.at_speed[0].damping_ratio >= 1.0, "{}", mode.at_speed[0].damping_ratio);
+    let overdamped_modes: Vec<_> =
+        modes.iter().filter(|mode| mode.modes_at_speeds[0].frequency_rpm == 0.0).collect();
+    assert!(!overdamped_modes.is_empty());
+    for mode in overdamped_modes {
+        assert!(
+            mode.modes_at_speeds[0].damping_ratio >= 1.0,
+            "{}",
+            mode.modes_at_speeds[0].damping_ratio
+        );
     }
 }

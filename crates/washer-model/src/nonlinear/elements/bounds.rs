@@ -28,15 +28,15 @@ impl Elements<f64> {
         let tub = TubMotion::new(&TUB_COORDINATES.map(|i| N(q[i])), &[N(0.0); 4]);
         for spring in &mut linear_elements.springs {
             let ends = &spring.ends;
-            let displacement = tub.point_motion(&ends.tub).displacement;
-            let span = subtract(displacement, &subtract(ends.cabinet, &ends.tub));
+            let displacement = tub.point_motion(&ends.tub_end).displacement;
+            let span = subtract(displacement, &subtract(ends.cabinet_end, &ends.tub_end));
             let length = dot(&span, &span).sqrt();
             let elongation = length - spring.free_length;
-            let cubic = spring.cubic_stiffness;
+            let cubic_stiffness = spring.cubic_stiffness;
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
-                + cubic * elongation * elongation * elongation;
+                + cubic_stiffness * elongation * elongation * elongation;
             let max_elongation = elongation.abs() + MAX_TRAVEL_M;
-            spring.stiffness += 3.0 * (cubic * max_elongation * max_elongation).v();
+            spring.stiffness += 3.0 * (cubic_stiffness * max_elongation * max_elongation).v();
             // The tension at rest is kept, because the stiffness across the line depends on it.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
             spring.cubic_stiffness = N(0.0);
@@ -44,20 +44,20 @@ impl Elements<f64> {
         let mut onset_springs = Vec::new();
         for damper in &mut linear_elements.dampers {
             onset_springs.extend(damper.onset_spring());
-            damper.damping +=
-                damper.friction / damper.friction_speed_squared.sqrt() + damper.outer_damping;
-            damper.friction = N(0.0);
+            damper.damping += damper.coulomb_friction / damper.friction_speed_squared.sqrt()
+                + damper.outer_damping;
+            damper.coulomb_friction = N(0.0);
             damper.outer_damping = N(0.0);
         }
         linear_elements.springs.append(&mut onset_springs);
         for stop in &mut linear_elements.stops {
-            let depth = stop.depth(&tub.point_motion(&stop.tub));
+            let depth = stop.depth(&tub.point_motion(&stop.tub_point));
             let StopCoefficients { clearance, softness_squared, .. } = *stop;
             stop.clearance =
                 clearance + depth - CONTACT_DEPTH_PER_SOFTNESS * softness_squared.sqrt();
         }
         for bushing in &mut linear_elements.bushings {
-            let displacement = tub.point_motion(&bushing.tub).displacement;
+            let displacement = tub.point_motion(&bushing.tub_point).displacement;
             for i in 0..3 {
                 let max_elongation = displacement[i].abs() + MAX_TRAVEL_M;
                 bushing.stiffness[i] +=
@@ -77,7 +77,7 @@ impl DamperCoefficients<f64> {
         if !self.has_free_stroke() {
             return None;
         }
-        let stiffness = self.friction / (2.0 * self.softness_squared.sqrt());
+        let stiffness = self.coulomb_friction / (2.0 * self.softness_squared.sqrt());
         Some(SpringCoefficients {
             ends: self.ends,
             stiffness,

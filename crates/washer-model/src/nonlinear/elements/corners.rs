@@ -22,7 +22,7 @@ impl<T: Lane> Elements<T> {
             motions.push(self.damper_motion(number, tub));
         }
         for stop in &self.stops {
-            let point = tub.point_motion(&stop.tub);
+            let point = tub.point_motion(&stop.tub_point);
             motions.push([stop.depth(&point), stop.speed(&point)]);
         }
         motions

@@ -27,7 +27,7 @@ fn ramp() -> Point {
 #[test]
 fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     let point = ramp();
-    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
+    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
     let entry_state = integrate(&point, STEP_S, [0.0, 1.8], &at_rest).end;
     // The interval contains the profile's kink.
     let crossing = forward_crossing([1.8, 2.2], None);
@@ -86,7 +86,7 @@ fn a_run_on_its_response_does_not_depart() {
 #[test]
 fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
     let point = ramp();
-    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
+    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
     let ramp_peaks = integrate(&point, STEP_S, [0.0, 3.0], &at_rest).peaks;
     let state_at_1_s = integrate(&point, STEP_S, [0.0, 1.0], &at_rest);
     let window_peaks = integrate(&point, STEP_S, [1.0, 3.0], &state_at_1_s.end).peaks;
@@ -115,7 +115,7 @@ fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
 fn a_run_that_leaves_its_range_reports_the_time() {
     let point = ramp();
     // The suspension cannot stop a motion of this speed within the model's range.
-    let mut start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
+    let mut start = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
     start[COORDINATES] = 1e4;
     let failure = integrate(&point, STEP_S, [0.0, 1.0], &start).failure.unwrap();
     assert!(failure.time_s > 0.0 && failure.time_s < 1.0, "{failure}");
