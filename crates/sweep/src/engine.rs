@@ -212,11 +212,13 @@ impl<'a> ModelEngine<'a> {
     ) {
         let state = Mutex::default();
         let changed = Condvar::new();
-        let pool = Pool { engine: self, source, sink, context, state, changed };
-        match rayon::current_thread_index() {
-            Some(_) => drop(rayon::broadcast(|_| pool.work())),
-            // Estimates time a single thread.
-            None => pool.work(),
+        // Estimates time a single thread.
+        let is_in_pool = rayon::current_thread_index().is_some();
+        let threads = if is_in_pool { rayon::current_num_threads() } else { 1 };
+        let pool = Pool { engine: self, source, sink, context, threads, state, changed };
+        match is_in_pool {
+            true => drop(rayon::broadcast(|_| pool.work())),
+            false => pool.work(),
         }
     }
 

@@ -27,9 +27,10 @@ use crate::plan::point_input;
 use sweep_engine::RowSource;
 use sweep_files::panics::lock;
 
-/// Number of points that are prepared together: one for each lane. Doubling it makes threads wait
-/// longer for the first runs.
-const PREPARE_BATCH: usize = MAX_LANES;
+/// Number of points that are prepared together. Basis: the searches for speed amplitudes of friction
+/// take different numbers of runs, and with four points per lane the lanes of most runs are full.
+/// Doubling it makes threads wait longer for the first runs.
+const PREPARE_BATCH: usize = 4 * MAX_LANES;
 
 /// Returns the number of runs by a method that a thread takes at once.
 fn batch_size(method: &Method) -> usize {
@@ -117,6 +118,8 @@ pub(super) struct Pool<'a> {
     pub(super) source: &'a RowSource<'a>,
     pub(super) sink: &'a OutcomeSink<'a>,
     pub(super) context: &'a RunContext<'a>,
+    /// The number of threads that call [`Self::work`].
+    pub(super) threads: usize,
     pub(super) state: Mutex<PoolState>,
     pub(super) changed: Condvar,
 }
@@ -126,10 +129,11 @@ impl Pool<'_> {
     pub(super) fn work(&self) {
         while !self.context.must_stop() {
             let mut state = self.lock();
-            match state.choose(&|(level, model)| {
+            let size_of_kind = |(level, model): RunKind| {
                 let size = |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
                 self.rule().map_or(MAX_LANES, size)
-            }) {
+            };
+            match state.choose(&size_of_kind, self.threads) {
                 Work::End => break,
                 Work::Wait => drop(self.changed.wait_timeout(state, STOP_POLL_INTERVAL)),
                 Work::Prepare => {
@@ -260,8 +264,9 @@ impl Pool<'_> {
 }
 
 impl PoolState {
-    /// Chooses a thread's next work. `size` returns the size of a full batch of a kind.
-    fn choose(&mut self, size: &dyn Fn(RunKind) -> usize) -> Work {
+    /// Chooses the next work of one of `threads` threads. `size` returns the size of a full batch
+    /// of a kind.
+    fn choose(&mut self, size: &dyn Fn(RunKind) -> usize, threads: usize) -> Work {
         let is_full = |(kind, waiting): &(&RunKind, &Vec<u64>)| waiting.len() >= size(**kind);
         let finest = self.waiting.iter().rfind(is_full).map(|(kind, _)| *kind);
         if let Some(kind) = finest.or_else(|| self.overdue()) {
@@ -272,8 +277,8 @@ impl PoolState {
         }
         let coarsest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
         match coarsest.map(|(kind, waiting)| (*kind, waiting.len())) {
-            // The other half is left to other threads.
-            Some((kind, count)) => self.take(kind, count.div_ceil(2).max(MAX_LANES)),
+            // Each thread takes its share, so that none waits for the last batch of another.
+            Some((kind, count)) => self.take(kind, count.div_ceil(threads).max(MAX_LANES)),
             None if self.busy_threads == 0 => Work::End,
             None => Work::Wait,
         }
