@@ -3,7 +3,9 @@
 
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{amplification, contraction, difference_of_levels, error_of_level};
+use crate::error_control::{
+    amplification, contraction, difference_of_levels, error_of_level, own_share,
+};
 use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
@@ -175,12 +177,6 @@ impl ModelRefinement {
         self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
     }
 
-    /// Returns the relative difference of the last two levels; `None` if there are no two, or they
-    /// cannot be compared.
-    fn last_difference(&self) -> Option<f64> {
-        self.differences.last()?.relative()
-    }
-
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
@@ -191,8 +187,9 @@ impl ModelRefinement {
             [.., previous, _] => previous.contracted_to(kind),
             _ => 0.0,
         };
-        let error = error_of_level(self.last_difference()?, contracted_difference)?;
-        Some(error.max(rule.relative_ringing(self.level, self)))
+        let last = self.differences.last()?;
+        let error = error_of_level(last.relative()?, contracted_difference)?;
+        Some((own_share(last.start) * error).max(rule.relative_ringing(self.level, self)))
     }
 
     /// Returns the level to run next if the error is above the accuracy or the verdict
