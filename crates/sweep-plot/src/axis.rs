@@ -37,7 +37,7 @@ impl AxisScale {
 
     /// Returns a linear scale that includes all `values` with a margin of 5 % at both ends; 0 to 1
     /// if there are none.
-    pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn around_values(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
         let margin = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
         Self::linear(low - margin, high + margin)
@@ -85,13 +85,13 @@ pub(crate) struct TickStep {
 impl TickStep {
     /// Yields every step that a page can need in rising order: from 1e-15 to 5e15 in the axis'
     /// unit.
-    pub(crate) fn all() -> impl Iterator<Item = Self> {
+    pub(crate) fn all_steps() -> impl Iterator<Item = Self> {
         let steps_at_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
         (-15..=15).flat_map(steps_at_power)
     }
 
     /// Returns the shortest step that is not shorter than `min_length`, a positive number.
-    fn at_least(min_length: f64) -> Self {
+    fn with_min_length(min_length: f64) -> Self {
         let power = min_length.log10().floor() as i32;
         let factor = min_length / 10_f64.powi(power);
         match [1, 2, 5].into_iter().find(|&step| f64::from(step) >= factor) {
@@ -121,12 +121,12 @@ impl TickStep {
 }
 
 fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
-    let wanted_length = (high - low) / count.max(1) as f64;
-    if !(wanted_length > 0.0 && wanted_length.is_finite()) {
+    let min_length = (high - low) / count.max(1) as f64;
+    if !(min_length > 0.0 && min_length.is_finite()) {
         return Vec::new();
     }
     let shortest_length = f64::EPSILON * low.abs().max(high.abs());
-    let mut step = TickStep::at_least(STEP_TOLERANCE * wanted_length);
+    let mut step = TickStep::with_min_length(STEP_TOLERANCE * min_length);
     // A step may give fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
     // labels of neighbouring ticks differ.
     while step.length() > shortest_length {
@@ -256,13 +256,13 @@ mod tests {
 
     #[test]
     fn extreme_ends_give_at_most_16_ticks() {
-        let least_subnormal = f64::from_bits(1);
-        let least_normal = f64::MIN_POSITIVE;
-        let ends = [
+        let min_subnormal = f64::from_bits(1);
+        let min_normal = f64::MIN_POSITIVE;
+        let scale_ends = [
             0.0,
-            least_subnormal,
-            -least_subnormal,
-            least_normal,
+            min_subnormal,
+            -min_subnormal,
+            min_normal,
             1.0,
             1e15,
             1e16 + 2.0,
@@ -274,12 +274,14 @@ mod tests {
             f64::NEG_INFINITY,
             f64::NAN,
         ];
-        for (&from, &to) in ends.iter().flat_map(|from| ends.iter().map(move |to| (from, to))) {
+        for (&from, &to) in
+            scale_ends.iter().flat_map(|from| scale_ends.iter().map(move |to| (from, to)))
+        {
             // Pairs of neighbouring floats are tried too: no tick label can tell them apart.
             for to in [to, from.next_up(), from * (1.0 + 1e-15), from + to] {
                 for scale in [AxisScale::linear(from, to), AxisScale::logarithmic(from, to)] {
-                    let ticks = scale.ticks(6).len();
-                    assert!(ticks <= 16, "{scale:?}: {ticks}");
+                    let tick_count = scale.ticks(6).len();
+                    assert!(tick_count <= 16, "{scale:?}: {tick_count}");
                 }
             }
         }
@@ -287,11 +289,11 @@ mod tests {
 
     #[test]
     fn tick_steps_rise_and_shorter_returns_the_one_before() {
-        let steps: Vec<TickStep> = TickStep::all().collect();
+        let steps: Vec<TickStep> = TickStep::all_steps().collect();
         for pair in steps.windows(2) {
             assert!(pair[0].length() < pair[1].length());
             assert_eq!(pair[1].next_shorter(), pair[0]);
-            assert_eq!(TickStep::at_least(STEP_TOLERANCE * pair[1].length()), pair[1]);
+            assert_eq!(TickStep::with_min_length(STEP_TOLERANCE * pair[1].length()), pair[1]);
         }
     }
 

@@ -44,15 +44,23 @@ pub(crate) struct Decimator {
     row: usize,
     /// The bucket of the next row.
     bucket: usize,
-    least: Option<(usize, f64)>,
-    greatest: Option<(usize, f64)>,
+    least_row_and_value: Option<(usize, f64)>,
+    greatest_row_and_value: Option<(usize, f64)>,
     kept_values: Vec<f64>,
 }
 
 impl Decimator {
     pub(crate) fn new(buckets: Buckets, rule: KeptValues) -> Self {
         let kept_values = Vec::with_capacity(2 * buckets.count);
-        Self { buckets, rule, row: 0, bucket: 0, least: None, greatest: None, kept_values }
+        Self {
+            buckets,
+            rule,
+            row: 0,
+            bucket: 0,
+            least_row_and_value: None,
+            greatest_row_and_value: None,
+            kept_values,
+        }
     }
 
     /// Adds the next row's value. Rows beyond the announced number are ignored.
@@ -68,11 +76,17 @@ impl Decimator {
                 }
             }
             KeptValues::Extremes if value.is_finite() => {
-                if self.least.is_none_or(|(_, least)| value < least) {
-                    self.least = Some((self.row, value));
+                if self
+                    .least_row_and_value
+                    .is_none_or(|(_, least_row_and_value)| value < least_row_and_value)
+                {
+                    self.least_row_and_value = Some((self.row, value));
                 }
-                if self.greatest.is_none_or(|(_, greatest)| value > greatest) {
-                    self.greatest = Some((self.row, value));
+                if self
+                    .greatest_row_and_value
+                    .is_none_or(|(_, greatest_row_and_value)| value > greatest_row_and_value)
+                {
+                    self.greatest_row_and_value = Some((self.row, value));
                 }
             }
             KeptValues::Extremes => {}
@@ -80,7 +94,8 @@ impl Decimator {
         self.row += 1;
         if self.row == end_row {
             if self.rule == KeptValues::Extremes {
-                let extremes = [self.least.take(), self.greatest.take()];
+                let extremes =
+                    [self.least_row_and_value.take(), self.greatest_row_and_value.take()];
                 let mut extremes = extremes.map(|extreme| extreme.unwrap_or((0, f64::NAN)));
                 extremes.sort_by_key(|(row, _)| *row);
                 self.kept_values.extend(extremes.map(|(_, value)| value));
@@ -99,7 +114,7 @@ impl Decimator {
 mod tests {
     use super::*;
 
-    fn decimated(values: &[f64], count: usize, rule: KeptValues) -> Vec<f64> {
+    fn decimate(values: &[f64], count: usize, rule: KeptValues) -> Vec<f64> {
         let mut decimator = Decimator::new(Buckets::new(values.len(), count), rule);
         values.iter().for_each(|value| decimator.push(*value));
         decimator.finish()
@@ -107,26 +122,26 @@ mod tests {
 
     #[test]
     fn extremes_are_kept_in_order_of_time() {
-        assert_eq!(decimated(&[0.0, 3.0, -2.0, 1.0], 1, KeptValues::Extremes), [3.0, -2.0]);
-        assert_eq!(decimated(&[f64::NAN, 5.0], 1, KeptValues::Extremes), [5.0, 5.0]);
-        assert!(decimated(&[f64::NAN], 1, KeptValues::Extremes).iter().all(|value| value.is_nan()));
+        assert_eq!(decimate(&[0.0, 3.0, -2.0, 1.0], 1, KeptValues::Extremes), [3.0, -2.0]);
+        assert_eq!(decimate(&[f64::NAN, 5.0], 1, KeptValues::Extremes), [5.0, 5.0]);
+        assert!(decimate(&[f64::NAN], 1, KeptValues::Extremes).iter().all(|value| value.is_nan()));
         assert_eq!(
-            decimated(&[1.0, 2.0, 3.0, 4.0, 5.0], 2, KeptValues::Extremes),
+            decimate(&[1.0, 2.0, 3.0, 4.0, 5.0], 2, KeptValues::Extremes),
             [1.0, 2.0, 3.0, 5.0]
         );
     }
 
     #[test]
     fn instants_are_the_first_and_the_middle_one() {
-        assert_eq!(decimated(&[0.0, 1.0, 2.0, 3.0], 1, KeptValues::Instants), [0.0, 2.0]);
-        assert_eq!(decimated(&[0.0, 1.0], 2, KeptValues::Instants), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(decimate(&[0.0, 1.0, 2.0, 3.0], 1, KeptValues::Instants), [0.0, 2.0]);
+        assert_eq!(decimate(&[0.0, 1.0], 2, KeptValues::Instants), [0.0, 0.0, 1.0, 1.0]);
     }
 
     #[test]
     fn buckets_cover_every_row_once() {
         for rows in [1_u32, 3, 499, 500, 501, 12_345] {
             let values: Vec<f64> = (0..rows).map(f64::from).collect();
-            let decimated_values = decimated(&values, 500, KeptValues::Extremes);
+            let decimated_values = decimate(&values, 500, KeptValues::Extremes);
             assert_eq!(decimated_values.len(), 2 * 500.min(rows as usize));
             let first_values: Vec<f64> = decimated_values.chunks(2).map(|pair| pair[0]).collect();
             let last_values: Vec<f64> = decimated_values.chunks(2).map(|pair| pair[1]).collect();

@@ -4,15 +4,15 @@
 use std::rc::Rc;
 
 use super::axis::{AxisScale, extremes, has_logarithm};
-use super::colour::{BOTH_SIDES, ColourScale, UNSTABLE_SHADE};
-use super::decimate::envelope;
+use super::colour::{BOTH_SIDES_COLOUR, ColourScale, UNSTABLE_SHADE};
+use super::decimate::envelope_indices;
 use super::frame::{
     BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, draw_heading,
-    draw_legend, legend_height,
+    draw_legend, measure_legend_height,
 };
 use super::label::Label;
 use super::raster::text_width;
-use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
+use super::scene::{Colour, INK, MUTED_COLOUR, Outline, PAPER, Scene, Stroke, Text};
 
 /// A figure of curves in panels over a common x axis.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -29,7 +29,7 @@ pub struct Chart {
     /// The legend entry of the marks.
     pub mark_meaning: String,
     /// Ranges of x that are shaded in all panels.
-    pub shades: Vec<[f64; 2]>,
+    pub shaded_ranges: Vec<[f64; 2]>,
     /// The legend entry of the shades.
     pub shade_meaning: String,
 }
@@ -49,7 +49,8 @@ pub struct ChartPanel {
     #[serde(rename = "log")]
     pub is_log: bool,
     /// The range of the y axis; by default the range of the series and levels.
-    pub range: Option<(f64, f64)>,
+    #[serde(rename = "range")]
+    pub y_range: Option<(f64, f64)>,
     /// The height in a picture, px.
     pub height: f64,
     /// The curves in drawing order.
@@ -61,7 +62,8 @@ pub struct ChartPanel {
     #[serde(skip)]
     pub stars: Vec<(f64, f64, String)>,
     /// Ranges of x whose cells hold points on both sides of the limit.
-    pub mixed: Vec<[f64; 2]>,
+    #[serde(rename = "mixed")]
+    pub mixed_ranges: Vec<[f64; 2]>,
 }
 
 impl ChartPanel {
@@ -74,7 +76,7 @@ impl ChartPanel {
 
 /// The style in which a series is drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Style {
+pub enum SeriesStyle {
     /// A solid line of this width, px.
     Solid(f64),
     Dashed,
@@ -94,7 +96,7 @@ pub struct Series {
     pub x: Rc<Vec<f64>>,
     /// The value at each x; NaN interrupts the line.
     pub y: Vec<f64>,
-    pub style: Style,
+    pub style: SeriesStyle,
 }
 
 impl Series {
@@ -103,7 +105,7 @@ impl Series {
         colour: Colour,
         x: impl Into<Rc<Vec<f64>>>,
         y: Vec<f64>,
-        style: Style,
+        style: SeriesStyle,
     ) -> Self {
         Self { name: name.into(), colour, x: x.into(), y, style }
     }
@@ -132,65 +134,65 @@ const STAR_MEANING: &str = "resonance speed";
 const OVERLAP_MEANING: &str = "both, one over the other";
 
 /// Draws the panels of a chart that are shown.
-pub(crate) fn draw(chart: &Chart) -> Scene {
+pub(crate) fn draw_chart(chart: &Chart) -> Scene {
     let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.is_shown).collect();
-    let legend_entries = legend_entries(chart, &panels);
+    let legend_entries = collect_legend_entries(chart, &panels);
     let width = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
-    let legend_height = legend_height(&legend_entries, width);
-    let heights: f64 = panels.iter().map(|panel| panel.height + PANEL_GAP).sum();
-    let label_lengths =
+    let legend_height = measure_legend_height(&legend_entries, width);
+    let panels_height: f64 = panels.iter().map(|panel| panel.height + PANEL_GAP).sum();
+    let label_heights =
         chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
-    let label_height = label_lengths.fold(0.0, f64::max);
+    let label_height = label_heights.fold(0.0, f64::max);
     let total_height =
-        HEADING_HEIGHT + label_height + heights + BOTTOM_MARGIN + legend_height + 4.0;
+        HEADING_HEIGHT + label_height + panels_height + BOTTOM_MARGIN + legend_height + 4.0;
     let mut scene =
         Scene::new(FIGURE_WIDTH, total_height, format!("{}. {}", chart.title, chart.subtitle));
     draw_heading(&mut scene, &chart.title, &chart.subtitle);
-    let x_scale = x_scale(chart);
+    let x_scale = chart_x_scale(chart);
     let mut y = HEADING_HEIGHT + label_height;
-    for (index, &content) in panels.iter().enumerate() {
+    for (index, &chart_panel) in panels.iter().enumerate() {
         let panel = Panel {
             x: LEFT_MARGIN,
             y,
             width,
-            height: content.height,
+            height: chart_panel.height,
             x_scale,
-            y_scale: y_scale(content),
+            y_scale: panel_y_scale(chart_panel),
         };
         panel.draw_grid_lines(&mut scene);
         let mut dots = Vec::new();
-        scene.clipped(panel.outline(), |scene| {
-            dots = draw_panel(scene, chart, content, &panel);
+        scene.draw_clipped(panel.outline(), |scene| {
+            dots = draw_panel(scene, chart, chart_panel, &panel);
         });
-        if !has_visible_points(content) {
+        if !has_visible_points(chart_panel) {
             panel.write_centred(&mut scene, NO_VALUES_TEXT);
         }
         draw_marks(&mut scene, chart, &panel, index == 0);
-        draw_stars(&mut scene, content, &panel);
+        draw_stars(&mut scene, chart_panel, &panel);
         let is_last_panel = index + 1 == panels.len();
         panel.draw_frame(&mut scene, is_last_panel, true);
         // Dots are drawn after the frame and without clipping, so that they are whole at the edge
         // too.
         let is_in_panel = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
         for (position, radius, colour) in dots.into_iter().filter(|([_, y], ..)| is_in_panel(*y)) {
-            scene.fill(Outline::circle(position, radius), colour);
+            scene.fill_outline(Outline::circle(position, radius), colour);
         }
-        panel.draw_y_label(&mut scene, &content.label.to_string(), 62.0);
+        panel.draw_y_label(&mut scene, &chart_panel.label.to_string(), 62.0);
         if is_last_panel {
             panel.draw_x_label(&mut scene, &chart.x_label.to_string());
         }
-        y += content.height + PANEL_GAP;
+        y += chart_panel.height + PANEL_GAP;
     }
     draw_legend(&mut scene, &legend_entries, LEFT_MARGIN, y - PANEL_GAP + BOTTOM_MARGIN, width);
     scene
 }
 
 /// Returns the scale of the x axis: the range of all series, with a margin if all are dots.
-pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
+pub(crate) fn chart_x_scale(chart: &Chart) -> AxisScale {
     let all_series = || chart.panels.iter().flat_map(|panel| &panel.series);
     let xs = all_series().flat_map(|series| series.x.iter().copied());
-    if !chart.is_x_log && all_series().all(|series| series.style == Style::Dots) {
-        return AxisScale::around(xs);
+    if !chart.is_x_log && all_series().all(|series| series.style == SeriesStyle::Dots) {
+        return AxisScale::around_values(xs);
     }
     if chart.is_x_log {
         let positive_xs = xs.filter(|x| has_logarithm(*x));
@@ -207,8 +209,8 @@ pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
 }
 
 /// Returns the scale of a panel's y axis: its given range, or the range of its series and levels.
-pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
-    if let Some((low, high)) = panel.range {
+pub(crate) fn panel_y_scale(panel: &ChartPanel) -> AxisScale {
+    if let Some((low, high)) = panel.y_range {
         return if panel.is_log {
             AxisScale::logarithmic(low, high)
         } else {
@@ -216,7 +218,7 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
         };
     }
     let value_lists = panel.series.iter().flat_map(|series| match &series.style {
-        Style::Band(low, high) => [&low[..], &high[..]],
+        SeriesStyle::Band(low, high) => [&low[..], &high[..]],
         _ => [&series.y[..], &[]],
     });
     let values = value_lists.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
@@ -224,7 +226,7 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
         AxisScale::logarithmic(low / 1.15, high * 1.15)
     } else {
-        AxisScale::around(values)
+        AxisScale::around_values(values)
     }
 }
 
@@ -237,7 +239,7 @@ fn has_visible_points(panel: &ChartPanel) -> bool {
     let has_points = |series: &Series| {
         let has_any = |ys: &[f64]| ys.iter().any(is_shown);
         match &series.style {
-            Style::Band(low, high) => has_any(&series.y) || has_any(low) || has_any(high),
+            SeriesStyle::Band(low, high) => has_any(&series.y) || has_any(low) || has_any(high),
             _ => has_any(&series.y),
         }
     };
@@ -249,11 +251,13 @@ fn has_visible_points(panel: &ChartPanel) -> bool {
 fn draw_panel(
     scene: &mut Scene,
     chart: &Chart,
-    content: &ChartPanel,
+    chart_panel: &ChartPanel,
     panel: &Panel,
 ) -> Vec<([f64; 2], f64, Colour)> {
     let mut dots = Vec::new();
-    for (ranges, colour) in [(&chart.shades, UNSTABLE_SHADE), (&content.mixed, BOTH_SIDES)] {
+    for (ranges, colour) in
+        [(&chart.shaded_ranges, UNSTABLE_SHADE), (&chart_panel.mixed_ranges, BOTH_SIDES_COLOUR)]
+    {
         if ranges.is_empty() {
             continue;
         }
@@ -263,17 +267,16 @@ fn draw_panel(
             // A shade narrower than 1 px would not be visible.
             shaded_areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
         }
-        scene.fill(shaded_areas, colour);
+        scene.fill_outline(shaded_areas, colour);
     }
-    for series in &content.series {
+    for series in &chart_panel.series {
         let xs = &series.x;
-        let pixel_of_sample = |ys: &[f64], k: usize| {
+        let sample_pixel = |ys: &[f64], k: usize| {
             (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.pixel(xs[k], ys[k]))
         };
-        if let Style::Band(low, high) = &series.style {
-            let band_edges: Vec<_> = (0..xs.len())
-                .map(|k| pixel_of_sample(low, k).zip(pixel_of_sample(high, k)))
-                .collect();
+        if let SeriesStyle::Band(low, high) = &series.style {
+            let band_edges: Vec<_> =
+                (0..xs.len()).map(|k| sample_pixel(low, k).zip(sample_pixel(high, k))).collect();
             let mut outline = Outline::default();
             for run in band_edges.split(Option::is_none).filter(|run| !run.is_empty()) {
                 let (mut low_points, mut high_points): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
@@ -287,26 +290,31 @@ fn draw_panel(
                 low_points.extend(high_points.into_iter().rev());
                 outline.add_polygon(&low_points);
             }
-            scene.fill(outline, series.colour.with_alpha(90));
+            scene.fill_outline(outline, series.colour.with_alpha(90));
         }
-        if series.style == Style::Dots {
-            let points = (0..xs.len()).filter_map(|k| pixel_of_sample(&series.y, k));
+        if series.style == SeriesStyle::Dots {
+            let points = (0..xs.len()).filter_map(|k| sample_pixel(&series.y, k));
             dots.extend(points.map(|point| (point, DOT_RADIUS, series.colour)));
             continue;
         }
-        let indices =
-            envelope(xs, &series.y, panel.x_scale.from, panel.x_scale.to, panel.width as usize);
-        let points: Vec<_> = indices.into_iter().map(|k| pixel_of_sample(&series.y, k)).collect();
+        let indices = envelope_indices(
+            xs,
+            &series.y,
+            panel.x_scale.from,
+            panel.x_scale.to,
+            panel.width as usize,
+        );
+        let points: Vec<_> = indices.into_iter().map(|k| sample_pixel(&series.y, k)).collect();
         let mut outline = Outline::default();
         let isolated_points = outline.add_runs(&points);
-        scene.line(outline, series_stroke(series));
+        scene.draw_line(outline, series_stroke(series));
         dots.extend(
             isolated_points.into_iter().map(|point| (point, ISOLATED_RADIUS, series.colour)),
         );
     }
-    for (value, _) in &content.levels {
+    for (value, _) in &chart_panel.levels {
         let y = panel.y_pixel(*value);
-        scene.line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
+        scene.draw_line(Outline::line(&[[panel.x, y], [panel.x + panel.width, y]]), level_stroke());
     }
     dots
 }
@@ -314,19 +322,19 @@ fn draw_panel(
 /// Returns the stroke of a series' line.
 pub(crate) fn series_stroke(series: &Series) -> Stroke {
     match series.style {
-        Style::Solid(width) => Stroke::solid(series.colour, width),
-        Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
-        Style::Band(..) | Style::Dots => Stroke::solid(series.colour, 2.2),
+        SeriesStyle::Solid(width) => Stroke::new_solid(series.colour, width),
+        SeriesStyle::Dashed => Stroke::new_dashed(series.colour, 1.8, &[8.0, 5.0]),
+        SeriesStyle::Band(..) | SeriesStyle::Dots => Stroke::new_solid(series.colour, 2.2),
     }
 }
 
 /// Returns the stroke of a level's line.
 pub(crate) fn level_stroke() -> Stroke {
-    Stroke::dashed(INK, 1.6, &[3.0, 3.0])
+    Stroke::new_dashed(INK, 1.6, &[3.0, 3.0])
 }
 
 fn mark_stroke() -> Stroke {
-    Stroke::dashed(MUTED, 1.2, &[6.0, 4.0])
+    Stroke::new_dashed(MUTED_COLOUR, 1.2, &[6.0, 4.0])
 }
 
 /// Radius of a dot, px. Doubling it quadruples the ink of dense series.
@@ -340,14 +348,14 @@ type Rectangle = [f64; 4];
 
 /// Draws all stars, then their labels. A label is placed where it covers no star and no earlier
 /// label; among such positions, that with the fewest curves across it is chosen.
-fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
-    let mut occupied: Vec<Rectangle> = Vec::new();
-    for (x, y, _) in &content.stars {
+fn draw_stars(scene: &mut Scene, chart_panel: &ChartPanel, panel: &Panel) {
+    let mut occupied_areas: Vec<Rectangle> = Vec::new();
+    for (x, y, _) in &chart_panel.stars {
         let [x, y] = panel.pixel(*x, *y);
-        scene.fill(Outline::star([x, y], STAR_RADIUS), INK);
-        occupied.push([x - STAR_RADIUS, y - STAR_RADIUS, x + STAR_RADIUS, y + STAR_RADIUS]);
+        scene.fill_outline(Outline::star([x, y], STAR_RADIUS), INK);
+        occupied_areas.push([x - STAR_RADIUS, y - STAR_RADIUS, x + STAR_RADIUS, y + STAR_RADIUS]);
     }
-    for (x, y, label) in &content.stars {
+    for (x, y, label) in &chart_panel.stars {
         let [x, y] = panel.pixel(*x, *y);
         let width = text_width(label, TICK_SIZE, true);
         // The candidates lie on both sides of the star, from close to it to farther above and
@@ -363,31 +371,31 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
                 && right < panel.x + panel.width
                 && top > panel.y
                 && bottom < panel.y + panel.height
-                && occupied.iter().all(|rectangle| {
+                && occupied_areas.iter().all(|rectangle| {
                     right < rectangle[0]
                         || left > rectangle[2]
                         || bottom < rectangle[1]
                         || top > rectangle[3]
                 })
         };
-        let position = candidates
-            .filter(is_unobstructed)
-            .min_by_key(|position| count_curves_through(content, panel, text_extent(*position)));
+        let position = candidates.filter(is_unobstructed).min_by_key(|position| {
+            count_curves_through(chart_panel, panel, text_extent(*position))
+        });
         let position = position.unwrap_or([x_candidates[1], y + 18.0]);
-        occupied.push(text_extent(position));
-        let text = Text::new(label.clone(), position, TICK_SIZE).bold();
-        scene.text(Text { halo: Some(PAPER), ..text });
+        occupied_areas.push(text_extent(position));
+        let text = Text::new(label.clone(), position, TICK_SIZE).with_bold_face();
+        scene.draw_text(Text { halo: Some(PAPER), ..text });
     }
 }
 
 /// Returns the number of curves of a panel that pass through a rectangle.
-fn count_curves_through(content: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
+fn count_curves_through(chart_panel: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
     let passes_through = |series: &&Series| {
         let points = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.pixel(x, y));
         let points: Vec<[f64; 2]> = points.collect();
         points.windows(2).any(|pair| segment_intersects([pair[0], pair[1]], extent))
     };
-    content.series.iter().filter(passes_through).count()
+    chart_panel.series.iter().filter(passes_through).count()
 }
 
 /// Returns whether a part of a line segment lies within a rectangle (Liang-Barsky clipping).
@@ -417,20 +425,21 @@ fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, is_labelled: bool
     let mut next_free_x = f64::NEG_INFINITY;
     for mark in &chart.marks {
         let x = panel.x_pixel(mark.x);
-        scene.line(Outline::line(&[[x, panel.y], [x, panel.y + panel.height]]), mark_stroke());
+        scene.draw_line(Outline::line(&[[x, panel.y], [x, panel.y + panel.height]]), mark_stroke());
         let label_x = x.max(next_free_x);
         if is_labelled && label_x <= panel.x + panel.width + 8.0 {
             next_free_x = label_x + TICK_SIZE + 2.0;
-            let leader = Outline::line(&[[x, panel.y], [label_x, panel.y - 12.0]]);
-            scene.line(leader, Stroke::solid(MUTED, 1.2));
-            scene.text(
-                Text::new(mark.label.clone(), [label_x + 5.0, panel.y - 16.0], TICK_SIZE).rotated(),
+            let leader_line = Outline::line(&[[x, panel.y], [label_x, panel.y - 12.0]]);
+            scene.draw_line(leader_line, Stroke::new_solid(MUTED_COLOUR, 1.2));
+            scene.draw_text(
+                Text::new(mark.label.clone(), [label_x + 5.0, panel.y - 16.0], TICK_SIZE)
+                    .with_rotation(),
             );
         }
     }
 }
 
-fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
+fn collect_legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
     let mut entries: Vec<(LegendSymbol, String)> = Vec::new();
     let mut add_entry = |symbol: LegendSymbol, name: &str| {
         if !name.is_empty() && !entries.iter().any(|(_, known_name)| known_name == name) {
@@ -439,7 +448,7 @@ fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, S
     };
     for panel in panels {
         for series in &panel.series {
-            if series.style == Style::Dots {
+            if series.style == SeriesStyle::Dots {
                 let dot = Outline::circle([0.0, 0.0], 1.4 * DOT_RADIUS);
                 add_entry(LegendSymbol::Shape(dot, true, series.colour), &series.name);
                 continue;
@@ -451,14 +460,14 @@ fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, S
         if let [.., under, over] = &panel.series[..]
             && over.colour.alpha < 255
         {
-            let overlap = Stroke::solid(over.colour.over(under.colour), 2.2);
-            add_entry(LegendSymbol::Line(overlap), OVERLAP_MEANING);
+            let overlap_stroke = Stroke::new_solid(over.colour.over(under.colour), 2.2);
+            add_entry(LegendSymbol::Line(overlap_stroke), OVERLAP_MEANING);
         }
         for (_, meaning) in &panel.levels {
             add_entry(LegendSymbol::Line(level_stroke()), meaning);
         }
-        if !panel.mixed.is_empty() {
-            add_entry(LegendSymbol::Area(BOTH_SIDES), MIXED_MEANING);
+        if !panel.mixed_ranges.is_empty() {
+            add_entry(LegendSymbol::Area(BOTH_SIDES_COLOUR), MIXED_MEANING);
         }
         if !panel.stars.is_empty() {
             add_entry(LegendSymbol::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STAR_MEANING);
@@ -467,19 +476,19 @@ fn legend_entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, S
     if !chart.marks.is_empty() {
         add_entry(LegendSymbol::Line(mark_stroke()), &chart.mark_meaning);
     }
-    if !chart.shades.is_empty() {
+    if !chart.shaded_ranges.is_empty() {
         add_entry(LegendSymbol::Area(UNSTABLE_SHADE), &chart.shade_meaning);
     }
     entries
 }
 
-/// The legend entry of [`ChartPanel::mixed`].
+/// The legend entry of [`ChartPanel::mixed_ranges`].
 pub const MIXED_MEANING: &str = "both: reliable and unreliable points";
 
 /// Returns whether positive values span more than a factor of ten, which calls for a logarithmic
 /// axis.
 pub fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
-    ColourScale::without_limit(values).axis.is_log
+    ColourScale::without_limit(values).axis_scale.is_log
 }
 
 #[cfg(test)]
@@ -489,15 +498,16 @@ mod tests {
     #[test]
     fn labels_of_stars_avoid_the_curves() {
         let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
-        let horizontal =
-            |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], Style::Solid(2.0));
+        let horizontal_series =
+            |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], SeriesStyle::Solid(2.0));
         // The second curve lies at the place that the first star's label prefers.
-        let mut series = vec![horizontal(147.8), horizontal(154.0), horizontal(162.1)];
-        series.push(Series { y: speeds.clone(), ..horizontal(0.0) });
+        let mut series =
+            vec![horizontal_series(147.8), horizontal_series(154.0), horizontal_series(162.1)];
+        series.push(Series { y: speeds.clone(), ..horizontal_series(0.0) });
         let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} Hz"))).to_vec();
         let panel = ChartPanel {
             stars,
-            range: Some((0.0, 300.0)),
+            y_range: Some((0.0, 300.0)),
             ..ChartPanel::new("frequency", Label::new("Frequency", ""), series)
         };
         let chart = Chart {
@@ -508,33 +518,33 @@ mod tests {
             panels: vec![panel],
             marks: Vec::new(),
             mark_meaning: String::new(),
-            shades: Vec::new(),
+            shaded_ranges: Vec::new(),
             shade_meaning: String::new(),
         };
-        let scene = draw(&chart);
-        let labels = scene.items.iter().filter_map(|item| match item {
+        let scene = draw_chart(&chart);
+        let star_labels = scene.items.iter().filter_map(|item| match item {
             crate::scene::SceneItem::Text(text) if text.halo.is_some() => Some(text),
             _ => None,
         });
-        let content = &chart.panels[0];
+        let chart_panel = &chart.panels[0];
         let x = LEFT_MARGIN;
         let y = HEADING_HEIGHT;
-        let xs = x_scale(&chart);
-        let ys = y_scale(content);
+        let xs = chart_x_scale(&chart);
+        let ys = panel_y_scale(chart_panel);
         let panel = Panel {
             x,
             y,
             width: FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN,
-            height: content.height,
+            height: chart_panel.height,
             x_scale: xs,
             y_scale: ys,
         };
         let mut count = 0;
-        for text in labels {
+        for text in star_labels {
             let [left, base] = text.position;
             let width = text_width(&text.text, TICK_SIZE, true);
             let text_extent = [left, base - TICK_SIZE, left + width, base + 4.0];
-            assert_eq!(count_curves_through(content, &panel, text_extent), 0, "{}", text.text);
+            assert_eq!(count_curves_through(chart_panel, &panel, text_extent), 0, "{}", text.text);
             count += 1;
         }
         assert_eq!(count, 2);

@@ -33,7 +33,7 @@ const VIRIDIS: [u32; 10] = [
 
 /// Distinct colours of curves, in order of contrast: the palette of Okabe and Ito without yellow
 /// and black (jfly.uni-koeln.de/color).
-pub const DISTINCT: [Colour; 6] = [
+pub const DISTINCT_COLOURS: [Colour; 6] = [
     Colour::hex(0x0072b2),
     Colour::hex(0xd55e00),
     Colour::hex(0x009e73),
@@ -43,20 +43,20 @@ pub const DISTINCT: [Colour; 6] = [
 ];
 
 /// The colour of the nonlinear model in every figure.
-pub const NONLINEAR: Colour = DISTINCT[0];
+pub const NONLINEAR_COLOUR: Colour = DISTINCT_COLOURS[0];
 /// The colour of the linear model in every figure.
-pub const LINEAR: Colour = DISTINCT[1];
+pub const LINEAR_COLOUR: Colour = DISTINCT_COLOURS[1];
 /// The colour of cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale
 /// here has.
-pub(crate) const BOTH_SIDES: Colour = Colour::hex(0xf0e442);
+pub(crate) const BOTH_SIDES_COLOUR: Colour = Colour::hex(0xf0e442);
 /// The colour of dots on the good side of a limit: a blue that is dark enough for a dot on paper.
-pub(crate) const GOOD_SIDE: Colour = Colour::hex(0x3182bd);
+pub(crate) const GOOD_SIDE_COLOUR: Colour = Colour::hex(0x3182bd);
 /// The colour of dots on the bad side of a limit.
-pub(crate) const BAD_SIDE: Colour = Colour::hex(BAD_COLOURS[3]);
+pub(crate) const BAD_SIDE_COLOUR: Colour = Colour::hex(BAD_COLOURS[3]);
 /// The colour of speed ranges with an unstable response, translucent behind curves.
 pub(crate) const UNSTABLE_SHADE: Colour = Colour::hex(0xcc79a7).with_alpha(70);
 /// The colour of points that failed.
-pub const FAILED: Colour = Colour::hex(0xbfc5cc);
+pub const FAILED_COLOUR: Colour = Colour::hex(0xbfc5cc);
 
 /// Number of steps of a colour scale. Basis: few enough that neighbouring cells merge to one shape,
 /// and enough to look continuous. Doubling it nearly doubles the size of an SVG map.
@@ -66,7 +66,7 @@ pub(crate) const COLOUR_STEPS: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ColourScale {
     /// The range of values from the first colour to the last.
-    pub(crate) axis: AxisScale,
+    pub(crate) axis_scale: AxisScale,
     /// The value in the middle of a diverging scale; each of its sides has half of the colours,
     /// even if the sides differ in extent. `None` for a sequential scale, from dark to light.
     pub(crate) centre: Option<f64>,
@@ -77,24 +77,29 @@ pub(crate) struct ColourScale {
 }
 
 impl ColourScale {
-    const fn sequential(axis: AxisScale) -> Self {
-        Self { axis, centre: None, is_reversed: false, is_neutral: false }
+    const fn sequential(axis_scale: AxisScale) -> Self {
+        Self { axis_scale, centre: None, is_reversed: false, is_neutral: false }
     }
 
-    const fn diverging(axis: AxisScale, limit: f64, is_reversed: bool) -> Self {
-        Self { axis, centre: Some(limit), is_reversed, is_neutral: false }
+    const fn diverging(axis_scale: AxisScale, limit: f64, is_reversed: bool) -> Self {
+        Self { axis_scale, centre: Some(limit), is_reversed, is_neutral: false }
     }
 
     /// Returns the scale of ratios around a limit, logarithmic.
-    pub(crate) fn ratio(values: impl Iterator<Item = f64>, limit: f64, is_reversed: bool) -> Self {
+    pub(crate) fn for_ratios(
+        values: impl Iterator<Item = f64>,
+        limit: f64,
+        is_reversed: bool,
+    ) -> Self {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((limit, limit));
-        let axis = AxisScale::logarithmic(low.min(limit / 2.0), high.max(limit * 2.0));
-        Self::diverging(axis, limit, is_reversed)
+        let axis_scale = AxisScale::logarithmic(low.min(limit / 2.0), high.max(limit * 2.0));
+        Self::diverging(axis_scale, limit, is_reversed)
     }
 
     /// Returns the scale of factors, which reaches as far below 1 as above it.
-    pub(crate) fn around_one(values: impl Iterator<Item = f64>) -> Self {
-        let greater_factor = |so_far: f64, value: f64| so_far.max(value).max(1.0 / value);
+    pub(crate) fn for_factors(values: impl Iterator<Item = f64>) -> Self {
+        let greater_factor =
+            |greatest_so_far: f64, value: f64| greatest_so_far.max(value).max(1.0 / value);
         let scale_end = values.filter(|value| *value > 0.0).fold(MIN_FACTOR_END, greater_factor);
         Self {
             is_neutral: true,
@@ -104,8 +109,8 @@ impl ColourScale {
 
     /// Returns the scale of differences, which reaches as far below 0 as above it. `is_reversed` if
     /// less is worse.
-    pub(crate) fn around_zero(values: impl Iterator<Item = f64>, is_reversed: bool) -> Self {
-        let greater_magnitude = |so_far: f64, value: f64| so_far.max(value.abs());
+    pub(crate) fn for_differences(values: impl Iterator<Item = f64>, is_reversed: bool) -> Self {
+        let greater_magnitude = |greatest_so_far: f64, value: f64| greatest_so_far.max(value.abs());
         let scale_end = values.filter(|value| value.is_finite()).fold(0.0, greater_magnitude);
         let scale_end = if scale_end > 0.0 { scale_end } else { 1.0 };
         Self {
@@ -155,25 +160,25 @@ impl ColourScale {
     pub(crate) fn position(&self, value: f64) -> f64 {
         let position = match self.centre {
             Some(centre) => {
-                let offset = self.axis.coordinate(value) - self.axis.coordinate(centre);
-                let [low, centre, high] =
-                    [self.axis.from, centre, self.axis.to].map(|value| self.axis.coordinate(value));
+                let offset = self.axis_scale.coordinate(value) - self.axis_scale.coordinate(centre);
+                let [low, centre, high] = [self.axis_scale.from, centre, self.axis_scale.to]
+                    .map(|value| self.axis_scale.coordinate(value));
                 let half_length = if offset < 0.0 { centre - low } else { high - centre };
                 0.5 + 0.5 * offset / half_length
             }
-            None => self.axis.position(value),
+            None => self.axis_scale.position(value),
         };
         position.clamp(0.0, 1.0)
     }
 
     /// Returns the colour step of a value.
-    pub(crate) fn step(&self, value: f64) -> usize {
+    pub(crate) fn step_index(&self, value: f64) -> usize {
         ((self.position(value) * COLOUR_STEPS as f64) as usize).min(COLOUR_STEPS - 1)
     }
 
     /// Returns the colour of a step.
-    pub(crate) fn colour(&self, step: usize) -> Colour {
-        let position = (step as f64 + 0.5) / COLOUR_STEPS as f64;
+    pub(crate) fn colour(&self, step_index: usize) -> Colour {
+        let position = (step_index as f64 + 0.5) / COLOUR_STEPS as f64;
         if self.centre.is_none() {
             return blend(&VIRIDIS, position);
         }
@@ -192,9 +197,9 @@ impl ColourScale {
 
     /// Returns the ticks of the colour bar.
     pub(crate) fn ticks(&self) -> Vec<Tick> {
-        let Some(centre) = self.centre else { return self.axis.ticks(6) };
-        let mut ticks = AxisScale { to: centre, ..self.axis }.ticks(3);
-        ticks.extend(AxisScale { from: centre, ..self.axis }.ticks(4));
+        let Some(centre) = self.centre else { return self.axis_scale.ticks(6) };
+        let mut ticks = AxisScale { to: centre, ..self.axis_scale }.ticks(3);
+        ticks.extend(AxisScale { from: centre, ..self.axis_scale }.ticks(4));
         ticks.retain(|tick| (self.position(tick.value) - 0.5).abs() > 0.04);
         ticks.push(Tick { value: centre, label: format_significant(centre, 3) });
         ticks
@@ -204,13 +209,14 @@ impl ColourScale {
 /// Returns the colour at `fraction` (0 to 1) of the range between evenly spaced anchors.
 fn blend(anchors: &[u32], fraction: f64) -> Colour {
     let position = fraction.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
-    let lower = (position as usize).min(anchors.len() - 2);
-    let weight = position - lower as f64;
-    let lower_colour = Colour::hex(anchors[lower]).rgb;
-    let upper_colour = Colour::hex(anchors[lower + 1]).rgb;
+    let lower_index = (position as usize).min(anchors.len() - 2);
+    let upper_weight = position - lower_index as f64;
+    let lower_colour = Colour::hex(anchors[lower_index]).rgb;
+    let upper_colour = Colour::hex(anchors[lower_index + 1]).rgb;
     let rgb = std::array::from_fn(|k| {
-        (f64::from(lower_colour[k]) * (1.0 - weight) + f64::from(upper_colour[k]) * weight).round()
-            as u8
+        (f64::from(lower_colour[k]) * (1.0 - upper_weight)
+            + f64::from(upper_colour[k]) * upper_weight)
+            .round() as u8
     });
     Colour { rgb, alpha: 255 }
 }
@@ -221,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_limit_is_the_middle_of_the_scale() {
-        let scale = ColourScale::ratio([1.0, 1.3, 50.0].into_iter(), 2.0, false);
+        let scale = ColourScale::for_ratios([1.0, 1.3, 50.0].into_iter(), 2.0, false);
         assert_eq!(scale.position(1.0), 0.0);
         assert_eq!(scale.position(2.0), 0.5);
         assert_eq!(scale.position(50.0), 1.0);
@@ -229,19 +235,21 @@ mod tests {
             (scale.position(10.0) - 0.75).abs() < 1e-12,
             "halfway between 2 and 50 by the logarithm"
         );
-        assert_eq!(scale.step(1e9), COLOUR_STEPS - 1);
+        assert_eq!(scale.step_index(1e9), COLOUR_STEPS - 1);
         let [red, _, blue] = scale.colour(COLOUR_STEPS - 1).rgb;
         assert!(red > blue, "the unreliable side is red");
     }
 
     #[test]
     fn lightness_falls_along_a_scale_and_jumps_at_the_limit() {
-        let scale = ColourScale::ratio([1.0, 9.0].into_iter(), 2.0, false);
-        let luminance = |level| {
-            let [red, green, blue] = scale.colour(level).rgb.map(f64::from);
+        let scale = ColourScale::for_ratios([1.0, 9.0].into_iter(), 2.0, false);
+        let luminance = |step_index| {
+            let [red, green, blue] = scale.colour(step_index).rgb.map(f64::from);
             0.2126 * red + 0.7152 * green + 0.0722 * blue
         };
-        assert!((1..COLOUR_STEPS).all(|level| luminance(level) < luminance(level - 1)));
+        assert!(
+            (1..COLOUR_STEPS).all(|step_index| luminance(step_index) < luminance(step_index - 1))
+        );
         assert!(
             luminance(COLOUR_STEPS / 2 - 1) - luminance(COLOUR_STEPS / 2) > 8.0,
             "a step at the limit"
@@ -260,20 +268,20 @@ mod tests {
     #[test]
     fn small_changes_are_nearly_grey() {
         let saturation = |scale: &ColourScale, value: f64| {
-            let rgb = scale.colour(scale.step(value)).rgb;
+            let rgb = scale.colour(scale.step_index(value)).rgb;
             rgb.iter().max().unwrap() - rgb.iter().min().unwrap()
         };
-        let factors = ColourScale::around_one([0.9995, 1.0005].into_iter());
+        let factors = ColourScale::for_factors([0.9995, 1.0005].into_iter());
         assert!([0.9995, 1.0, 1.0005].iter().all(|factor| saturation(&factors, *factor) < 24));
-        let factors = ColourScale::around_one([0.5, 1.1].into_iter());
+        let factors = ColourScale::for_factors([0.5, 1.1].into_iter());
         assert!(saturation(&factors, 1.0) < 24 && saturation(&factors, 0.5) > 70);
         assert_eq!(factors.position(2.0), 1.0, "as far above 1 as below it");
-        let gap_scale = ColourScale::around_zero([-0.001, 0.004].into_iter(), true);
+        let gap_scale = ColourScale::for_differences([-0.001, 0.004].into_iter(), true);
         assert!(saturation(&gap_scale, 0.0) < 24);
         assert_eq!([-0.004, 0.0, 0.004].map(|gap| gap_scale.position(gap)), [0.0, 0.5, 1.0]);
-        let [red, _, blue] = gap_scale.colour(gap_scale.step(-0.003)).rgb;
+        let [red, _, blue] = gap_scale.colour(gap_scale.step_index(-0.003)).rgb;
         assert!(red > blue, "a gap that got smaller is worse");
-        let constant_scale = ColourScale::around_zero([0.0, 0.0].into_iter(), true);
+        let constant_scale = ColourScale::for_differences([0.0, 0.0].into_iter(), true);
         assert!(constant_scale.position(0.0).is_finite());
     }
 

@@ -28,20 +28,20 @@ pub fn zero_lines(
     value: impl Fn(usize, usize) -> f64,
 ) -> Vec<Vec<[f64; 2]>> {
     let mut crossings: BTreeMap<GridEdge, [f64; 2]> = BTreeMap::new();
-    let mut links: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
+    let mut linked_edges: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
     for i in 0..xs.len().saturating_sub(1) {
         for j in 0..ys.len().saturating_sub(1) {
             for (from, to) in segments_in_square(i, j, &value) {
                 for edge in [from, to] {
-                    crossings.entry(edge).or_insert_with(|| crossing(edge, xs, ys, &value));
+                    crossings.entry(edge).or_insert_with(|| find_crossing(edge, xs, ys, &value));
                 }
-                links.entry(from).or_default().push(to);
-                links.entry(to).or_default().push(from);
+                linked_edges.entry(from).or_default().push(to);
+                linked_edges.entry(to).or_default().push(from);
             }
         }
     }
-    let line = |edges: Vec<GridEdge>| edges.iter().map(|edge| crossings[edge]).collect();
-    join_segments(&mut links).into_iter().map(line).collect()
+    let to_line = |edges: Vec<GridEdge>| edges.iter().map(|edge| crossings[edge]).collect();
+    join_segments(&mut linked_edges).into_iter().map(to_line).collect()
 }
 
 /// Returns the line segments within a square, each from edge to edge.
@@ -52,9 +52,9 @@ fn segments_in_square(
 ) -> Vec<(GridEdge, GridEdge)> {
     // The corners run counter-clockwise from the lower left.
     let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-    let corners = nodes.map(|(i, j)| value(i, j));
-    let is_above = corners.map(|corner| corner >= 0.0);
-    let known_corners: Vec<usize> = (0..4).filter(|&k| corners[k].is_finite()).collect();
+    let corner_values = nodes.map(|(i, j)| value(i, j));
+    let is_above = corner_values.map(|corner| corner >= 0.0);
+    let known_corners: Vec<usize> = (0..4).filter(|&k| corner_values[k].is_finite()).collect();
     if known_corners.len() < 3 {
         return Vec::new();
     }
@@ -68,36 +68,36 @@ fn segments_in_square(
         [a, b, c, d] => {
             // At a saddle the mean of the corners decides which pair of opposite corners is
             // connected; the other corners are cut off.
-            let middle_above = corners.iter().sum::<f64>() >= 0.0;
-            if is_above[0] == middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
+            let is_middle_above = corner_values.iter().sum::<f64>() >= 0.0;
+            if is_above[0] == is_middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
         }
         _ => Vec::new(),
     }
 }
 
-fn crossing(
+fn find_crossing(
     (from, (y, x)): GridEdge,
     xs: &[f64],
     ys: &[f64],
     value: &impl Fn(usize, usize) -> f64,
 ) -> [f64; 2] {
-    let start = value(from.0, from.1);
-    let end = value(x, y);
-    let fraction = start / (start - end);
+    let start_value = value(from.0, from.1);
+    let end_value = value(x, y);
+    let fraction = start_value / (start_value - end_value);
     [xs[from.0] + fraction * (xs[x] - xs[from.0]), ys[from.1] + fraction * (ys[y] - ys[from.1])]
 }
 
 /// Joins segments into lines; open lines come first, from one of their ends.
-fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
+fn join_segments(linked_edges: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
     let line_ends: Vec<GridEdge> =
-        links.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
-    let edges: Vec<GridEdge> = links.keys().copied().collect();
+        linked_edges.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
+    let edges: Vec<GridEdge> = linked_edges.keys().copied().collect();
     let mut lines = Vec::new();
     for start in line_ends.into_iter().chain(edges) {
         let mut line = vec![start];
         let mut current_edge = start;
-        while let Some(next) = links.get_mut(&current_edge).and_then(Vec::pop) {
-            if let Some(links_back) = links.get_mut(&next)
+        while let Some(next) = linked_edges.get_mut(&current_edge).and_then(Vec::pop) {
+            if let Some(links_back) = linked_edges.get_mut(&next)
                 && let Some(index) = links_back.iter().position(|&edge| edge == current_edge)
             {
                 links_back.remove(index);
@@ -114,10 +114,10 @@ fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridE
 
 /// Maximum number of points of level lines in a figure. Basis: a figure of a few megabytes.
 /// Doubling it doubles the size of figures with ragged boundaries.
-pub(crate) const MAX_POINTS: usize = 100_000;
+pub(crate) const MAX_LINE_POINTS: usize = 100_000;
 
 /// Removes the shortest lines of all cuts until at most `max_points` points are left.
-pub(crate) fn remove_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], max_points: usize) {
+pub(crate) fn remove_shortest_lines(lines: &mut [Vec<Vec<[f64; 2]>>], max_points: usize) {
     let mut lengths: Vec<usize> = lines.iter().flatten().map(Vec::len).collect();
     lengths.sort_unstable_by(|a, b| b.cmp(a));
     let mut points = 0;
@@ -137,13 +137,15 @@ pub(crate) fn remove_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], max_points: usiz
 mod tests {
     use super::*;
 
-    fn numbers(count: usize) -> Vec<f64> {
+    fn numbers_below(count: usize) -> Vec<f64> {
         (0..count).map(|k| k as f64).collect()
     }
 
     #[test]
     fn the_level_line_of_a_plane_is_straight() {
-        let lines = zero_lines(&numbers(6), &numbers(5), |i, j| 2.0 * i as f64 + j as f64 - 5.5);
+        let lines = zero_lines(&numbers_below(6), &numbers_below(5), |i, j| {
+            2.0 * i as f64 + j as f64 - 5.5
+        });
         assert_eq!(lines.len(), 1);
         assert!(lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
         let is_on_border = |[x, y]: [f64; 2]| x == 0.0 || x == 5.0 || y == 0.0 || y == 4.0;
@@ -152,8 +154,9 @@ mod tests {
 
     #[test]
     fn a_line_around_one_node_is_closed() {
-        let lines =
-            zero_lines(&numbers(5), &numbers(5), |i, j| if (i, j) == (2, 2) { 1.0 } else { -1.0 });
+        let lines = zero_lines(&numbers_below(5), &numbers_below(5), |i, j| {
+            if (i, j) == (2, 2) { 1.0 } else { -1.0 }
+        });
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].len(), 5);
         assert_eq!(lines[0].first(), lines[0].last());
@@ -162,7 +165,7 @@ mod tests {
     #[test]
     fn the_two_lines_of_a_saddle_do_not_meet() {
         let saddle_corners = [[1.0, -1.0], [-1.0, 3.0]];
-        let lines = zero_lines(&numbers(2), &numbers(2), |i, j| saddle_corners[i][j]);
+        let lines = zero_lines(&numbers_below(2), &numbers_below(2), |i, j| saddle_corners[i][j]);
         // The mean of the corners is positive, so that the positive corners are connected and the
         // negative ones cut off.
         assert_eq!(lines.len(), 2);
@@ -182,7 +185,7 @@ mod tests {
     fn no_line_is_drawn_beside_unknown_values() {
         let is_unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
         let value = |i: usize, j: usize| if is_unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
-        let lines = zero_lines(&numbers(5), &numbers(6), value);
+        let lines = zero_lines(&numbers_below(5), &numbers_below(6), value);
         assert!(lines.iter().flatten().all(|point| point.iter().all(|c| c.is_finite())));
         assert!(lines.iter().flatten().all(|[_, y]| *y <= 0.5 || *y >= 3.0 - 0.5));
         let total_extent: f64 =
@@ -192,19 +195,22 @@ mod tests {
 
     #[test]
     fn a_value_at_the_level_belongs_to_the_upper_side() {
-        let lines = zero_lines(&numbers(3), &numbers(2), |i, _| i as f64 - 1.0);
+        let lines = zero_lines(&numbers_below(3), &numbers_below(2), |i, _| i as f64 - 1.0);
         assert_eq!(lines, [[[1.0, 0.0], [1.0, 1.0]]]);
     }
 
     #[test]
     fn the_shortest_lines_are_removed_first() {
-        let line = |points: usize| vec![[0.0, 0.0]; points];
-        let mut cuts = [vec![line(2), line(7)], vec![line(4), line(2)]];
-        remove_shortest(&mut cuts, 12);
-        assert_eq!(cuts, [vec![line(7)], vec![line(4)]]);
-        remove_shortest(&mut cuts, 11);
+        let line_with_points = |points: usize| vec![[0.0, 0.0]; points];
+        let mut cuts = [
+            vec![line_with_points(2), line_with_points(7)],
+            vec![line_with_points(4), line_with_points(2)],
+        ];
+        remove_shortest_lines(&mut cuts, 12);
+        assert_eq!(cuts, [vec![line_with_points(7)], vec![line_with_points(4)]]);
+        remove_shortest_lines(&mut cuts, 11);
         assert_eq!(cuts.iter().flatten().count(), 2);
-        remove_shortest(&mut cuts, 3);
+        remove_shortest_lines(&mut cuts, 3);
         assert_eq!(cuts.iter().flatten().count(), 0);
     }
 }

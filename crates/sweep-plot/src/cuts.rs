@@ -12,7 +12,7 @@ use super::together::NamedPoint;
 const MAX_PANELS: usize = 9;
 
 /// Maximum number of values of an axis that a message lists. Basis: a message of a few lines.
-const MAX_LISTED: usize = 24;
+const MAX_LISTED_VALUES: usize = 24;
 
 /// Minimum number of cells along each of the first two axes of a page; a map with more cuts than
 /// then fit shows only some of them. Basis: fewer cells blur a boundary. Doubling it leaves a
@@ -23,7 +23,7 @@ const MIN_CELLS_ALONG_AXIS: usize = 64;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cuts {
     /// The indices of the values shown of each axis beyond the second.
-    pub(crate) picks: Vec<Vec<usize>>,
+    pub(crate) picked_indices: Vec<Vec<usize>>,
     /// The cuts in the order in which they are shown; a page opens with the first.
     pub(crate) cuts: Vec<Cut>,
     /// Sentences of the subtitle: fixed values and omitted ones.
@@ -34,7 +34,7 @@ pub(crate) struct Cuts {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cut {
     /// The position of the cut's value in the picks, for each axis beyond the second.
-    pub(crate) other_picks: Vec<usize>,
+    pub(crate) pick_positions: Vec<usize>,
     /// The name that distinguishes the cut from the others.
     pub(crate) name: Option<String>,
 }
@@ -52,30 +52,31 @@ impl Cuts {
         requested_values: &NamedPoint,
     ) -> Result<Self> {
         let further_axes = axes.get(2..).unwrap_or_default();
-        let fixed_values = fixed_values(source, further_axes, requested_values)?;
+        let fixed_indices = find_fixed_indices(source, further_axes, requested_values)?;
         // The third axis becomes panels unless it is fixed.
-        let is_third_axis_free = fixed_values.first() == Some(&None);
+        let is_third_axis_free = fixed_indices.first() == Some(&None);
         let mut counts = vec![1; further_axes.len()];
         if let Some(axis) = further_axes.first().filter(|_| is_third_axis_free) {
             counts[0] = axis.values.len().min(MAX_PANELS);
         }
-        let picks = pick_values(further_axes, &fixed_values, &counts);
-        let fixed = further_axes.iter().zip(&picks).skip(usize::from(is_third_axis_free));
+        let picked_indices = pick_values(further_axes, &fixed_indices, &counts);
+        let fixed_axes =
+            further_axes.iter().zip(&picked_indices).skip(usize::from(is_third_axis_free));
         let mut notes: Vec<String> =
-            fixed.map(|(axis, pick)| axis.format_value(axis.values[pick[0]])).collect();
-        let mut cuts = vec![Cut { other_picks: vec![0; further_axes.len()], name: None }];
+            fixed_axes.map(|(axis, pick)| axis.format_value(axis.values[pick[0]])).collect();
+        let mut cuts = vec![Cut { pick_positions: vec![0; further_axes.len()], name: None }];
         if let Some(axis) = further_axes.first().filter(|_| is_third_axis_free) {
-            if picks[0].len() < axis.values.len() {
-                notes.push(omission_note(axis, picks[0].len()));
+            if picked_indices[0].len() < axis.values.len() {
+                notes.push(omission_note(axis, picked_indices[0].len()));
             }
-            let cut_at_pick = |(position, pick): (usize, &usize)| {
-                let mut other_picks = vec![0; further_axes.len()];
-                other_picks[0] = position;
-                Cut { other_picks, name: Some(axis.format_value(axis.values[*pick])) }
+            let to_cut = |(position, pick): (usize, &usize)| {
+                let mut pick_positions = vec![0; further_axes.len()];
+                pick_positions[0] = position;
+                Cut { pick_positions, name: Some(axis.format_value(axis.values[*pick])) }
             };
-            cuts = picks[0].iter().enumerate().map(cut_at_pick).collect();
+            cuts = picked_indices[0].iter().enumerate().map(to_cut).collect();
         }
-        Ok(Self { picks, cuts, notes })
+        Ok(Self { picked_indices, cuts, notes })
     }
 
     /// Returns the cuts of a page of at most `max_cells` cells. If not all cuts fit, it shows those
@@ -83,7 +84,7 @@ impl Cuts {
     /// fixed values, or else with the first cut.
     ///
     /// # Errors
-    /// The errors of [`fixed_values`].
+    /// The errors of [`find_fixed_indices`].
     pub(crate) fn for_page(
         source: &FigureFile,
         axes: &[SweptAxis],
@@ -91,38 +92,44 @@ impl Cuts {
         max_cells: usize,
     ) -> Result<Self> {
         let further_axes = axes.get(2..).unwrap_or_default();
-        let fixed_values = fixed_values(source, further_axes, requested_values)?;
+        let fixed_indices = find_fixed_indices(source, further_axes, requested_values)?;
         let min_cells = |axis: &SweptAxis| axis.values.len().min(MIN_CELLS_ALONG_AXIS);
         let max_cuts = (max_cells / axes.iter().take(2).map(min_cells).product::<usize>()).max(1);
         let mut counts: Vec<usize> = further_axes.iter().map(|axis| axis.values.len()).collect();
         let exceeds_max_cuts = |counts: &[usize]| {
-            let cuts = counts.iter().try_fold(1_usize, |cuts, count| cuts.checked_mul(*count));
-            cuts.is_none_or(|cuts| cuts > max_cuts)
+            let cut_count =
+                counts.iter().try_fold(1_usize, |cut_count, count| cut_count.checked_mul(*count));
+            cut_count.is_none_or(|cut_count| cut_count > max_cuts)
         };
         if exceeds_max_cuts(&counts) {
             for (count, _) in counts
                 .iter_mut()
-                .zip(&fixed_values)
+                .zip(&fixed_indices)
                 .filter(|(_, fixed_index)| fixed_index.is_some())
             {
                 *count = 1;
             }
         }
         while exceeds_max_cuts(&counts) {
-            let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
-            *greatest -= 1;
+            let Some(greatest_count) = counts.iter_mut().max().filter(|count| **count > 1) else {
+                break;
+            };
+            *greatest_count -= 1;
         }
-        let picks = pick_values(further_axes, &fixed_values, &counts);
-        let shortened_axes =
-            further_axes.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
+        let picked_indices = pick_values(further_axes, &fixed_indices, &counts);
+        let shortened_axes = further_axes
+            .iter()
+            .zip(&picked_indices)
+            .filter(|(axis, pick)| pick.len() < axis.values.len());
         let notes = shortened_axes.map(|(axis, pick)| omission_note(axis, pick.len())).collect();
-        let fixed_position = |(pick, fixed_index): (&Vec<usize>, &Option<usize>)| {
+        let to_fixed_position = |(pick, fixed_index): (&Vec<usize>, &Option<usize>)| {
             fixed_index
                 .and_then(|fixed_index| pick.iter().position(|index| *index == fixed_index))
                 .unwrap_or(0)
         };
-        let other_picks = picks.iter().zip(&fixed_values).map(fixed_position).collect();
-        Ok(Self { picks, cuts: vec![Cut { other_picks, name: None }], notes })
+        let pick_positions =
+            picked_indices.iter().zip(&fixed_indices).map(to_fixed_position).collect();
+        Ok(Self { picked_indices, cuts: vec![Cut { pick_positions, name: None }], notes })
     }
 }
 
@@ -130,21 +137,21 @@ impl Cuts {
 /// else `counts` of them, evenly picked.
 fn pick_values(
     further_axes: &[SweptAxis],
-    fixed_values: &[Option<usize>],
+    fixed_indices: &[Option<usize>],
     counts: &[usize],
 ) -> Vec<Vec<usize>> {
-    let pick =
+    let pick_for_axis =
         |((axis, fixed_index), &count): ((&SweptAxis, &Option<usize>), &usize)| match fixed_index {
             Some(fixed_index) if count < axis.values.len() => vec![*fixed_index],
             _ => even_indices(axis.values.len(), count),
         };
-    further_axes.iter().zip(fixed_values).zip(counts).map(pick).collect()
+    further_axes.iter().zip(fixed_indices).zip(counts).map(pick_for_axis).collect()
 }
 
 /// Returns `count` indices below `length`, spread evenly from the first to the last.
 fn even_indices(length: usize, count: usize) -> Vec<usize> {
-    let last = (count - 1).max(1);
-    (0..count).map(|k| (k * (length - 1) + last / 2) / last).collect()
+    let last_index = (count - 1).max(1);
+    (0..count).map(|k| (k * (length - 1) + last_index / 2) / last_index).collect()
 }
 
 fn omission_note(axis: &SweptAxis, shown_count: usize) -> String {
@@ -156,7 +163,7 @@ fn omission_note(axis: &SweptAxis, shown_count: usize) -> String {
 /// # Errors
 /// [`PlotError::Unfit`] if `requested_values` names no axis beyond the second, or a value that its
 /// axis does not have; [`PlotError::NotAGrid`] for an axis with more values than are kept.
-fn fixed_values(
+fn find_fixed_indices(
     source: &FigureFile,
     further_axes: &[SweptAxis],
     requested_values: &NamedPoint,
@@ -168,7 +175,7 @@ fn fixed_values(
     let mut fixed_values = vec![None; further_axes.len()];
     for (name, value) in requested_values {
         let unknown_error = |what, valid_values: String| {
-            source.unknown_name("--at", format!("{name}={value}"), what, valid_values)
+            source.unknown_name_error("--at", format!("{name}={value}"), what, valid_values)
         };
         let axis_index =
             further_axes.iter().position(|axis| axis.name == *name).ok_or_else(|| {
@@ -181,7 +188,7 @@ fn fixed_values(
         fixed_values[axis_index] = Some(value_index.ok_or_else(|| {
             let format_value = |value: &f64| label::format_significant(*value, 6);
             let valid_values = match &values[..] {
-                [first, .., last] if values.len() > MAX_LISTED => {
+                [first, .., last] if values.len() > MAX_LISTED_VALUES => {
                     format!(
                         "{} of them from {} to {}",
                         values.len(),

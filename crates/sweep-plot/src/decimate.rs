@@ -6,34 +6,43 @@
 ///
 /// `xs` rises. A point that is not finite interrupts the line: the first of each run of them is
 /// kept. All points are kept if there are at most two for each interval.
-pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usize) -> Vec<usize> {
+pub(crate) fn envelope_indices(
+    xs: &[f64],
+    ys: &[f64],
+    from: f64,
+    to: f64,
+    buckets: usize,
+) -> Vec<usize> {
     if xs.len() <= 2 * buckets || buckets == 0 || to <= from {
         return (0..xs.len()).collect();
     }
-    let bucket = |index: usize| {
+    let bucket_index = |index: usize| {
         (((xs[index] - from) / (to - from) * buckets as f64) as usize).min(buckets - 1)
     };
     let mut kept_indices = Vec::with_capacity(2 * buckets + 2);
     let is_finite = |index: usize| ys[index].is_finite();
     let indices: Vec<usize> = (0..xs.len()).collect();
     for finite_run in indices.chunk_by(|&a, &b| {
-        is_finite(a) == is_finite(b) && (!is_finite(a) || bucket(a) == bucket(b))
+        is_finite(a) == is_finite(b) && (!is_finite(a) || bucket_index(a) == bucket_index(b))
     }) {
-        let start = finite_run[0];
-        let end = finite_run[finite_run.len() - 1];
-        if !is_finite(start) {
-            kept_indices.push(start);
+        let first_index = finite_run[0];
+        let last_index = finite_run[finite_run.len() - 1];
+        if !is_finite(first_index) {
+            kept_indices.push(first_index);
             continue;
         }
-        let least = finite_run
-            .iter()
-            .fold(start, |least, &index| if ys[index] < ys[least] { index } else { least });
-        let greatest = finite_run.iter().fold(start, |greatest_so_far, &index| {
+        let least_index = finite_run.iter().fold(first_index, |least_index, &index| {
+            if ys[index] < ys[least_index] { index } else { least_index }
+        });
+        let greatest_index = finite_run.iter().fold(first_index, |greatest_so_far, &index| {
             if ys[index] > ys[greatest_so_far] { index } else { greatest_so_far }
         });
-        let mut run_indices = vec![least, greatest];
-        run_indices.extend((start == 0 || !is_finite(start - 1)).then_some(start));
-        run_indices.extend((end + 1 == xs.len() || !is_finite(end + 1)).then_some(end));
+        let mut run_indices = vec![least_index, greatest_index];
+        run_indices
+            .extend((first_index == 0 || !is_finite(first_index - 1)).then_some(first_index));
+        run_indices.extend(
+            (last_index + 1 == xs.len() || !is_finite(last_index + 1)).then_some(last_index),
+        );
         run_indices.sort_unstable();
         run_indices.dedup();
         kept_indices.extend(run_indices);
@@ -50,7 +59,7 @@ mod tests {
         let xs: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 1e-3).collect();
         let mut ys: Vec<f64> = xs.iter().map(|x| (40.0 * x).sin()).collect();
         ys[54_321] = 7.0;
-        let kept_indices = envelope(&xs, &ys, 0.0, 100.0, 500);
+        let kept_indices = envelope_indices(&xs, &ys, 0.0, 100.0, 500);
         assert!(
             kept_indices.len() <= 1002 && kept_indices.contains(&54_321),
             "{}",
@@ -65,8 +74,8 @@ mod tests {
         let xs: Vec<f64> = (0..10_000).map(f64::from).collect();
         let mut ys = vec![1.0; 10_000];
         ys[5000..6000].fill(f64::NAN);
-        let kept_indices = envelope(&xs, &ys, 0.0, 10_000.0, 10);
+        let kept_indices = envelope_indices(&xs, &ys, 0.0, 10_000.0, 10);
         assert_eq!(kept_indices.iter().filter(|&&k| !ys[k].is_finite()).count(), 1);
-        assert_eq!(envelope(&xs[..20], &ys[..20], 0.0, 20.0, 10).len(), 20);
+        assert_eq!(envelope_indices(&xs[..20], &ys[..20], 0.0, 20.0, 10).len(), 20);
     }
 }

@@ -1,9 +1,11 @@
 //! Parts that all figures share: panels with axes, headings and legends.
 
 use super::axis::{AxisScale, Tick};
-use super::colour::FAILED;
+use super::colour::FAILED_COLOUR;
 use super::raster::text_width;
-use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
+use super::scene::{
+    Anchor, Colour, FAINT_COLOUR, Hatch, INK, MUTED_COLOUR, Outline, PAPER, Scene, Stroke, Text,
+};
 
 /// Width of a figure, px. Basis: a figure across a page. Twice the width halves the type in print.
 pub(crate) const FIGURE_WIDTH: f64 = 880.0;
@@ -77,23 +79,27 @@ impl Panel {
             let y = self.y_pixel(tick.value);
             lines.add_line(&[[self.x, y], [self.x + self.width, y]]);
         }
-        scene.line(lines, Stroke::solid(FAINT, 1.0));
+        scene.draw_line(lines, Stroke::new_solid(FAINT_COLOUR, 1.0));
     }
 
     /// Returns the numbers at the x axis that fit, with their centres (px): those at every tick, or
     /// at every second one, and so on. Numbers at the ends do not reach into neighbouring panels.
     fn numbers_that_fit(&self) -> Vec<(f64, String)> {
-        let numbers = self.x_ticks().into_iter().map(|tick| {
+        let placed_numbers = self.x_ticks().into_iter().map(|tick| {
             let width = text_width(&tick.label, TICK_SIZE, false);
-            let left = self.x - NUMBER_OVERHANG;
-            let right = self.x + self.width + NUMBER_OVERHANG;
-            let middle = self.x_pixel(tick.value).min(right - width / 2.0).max(left + width / 2.0);
+            let left_limit = self.x - NUMBER_OVERHANG;
+            let right_limit = self.x + self.width + NUMBER_OVERHANG;
+            let middle = self
+                .x_pixel(tick.value)
+                .min(right_limit - width / 2.0)
+                .max(left_limit + width / 2.0);
             (middle, width, tick.label)
         });
-        let numbers: Vec<_> = numbers.collect();
-        let every_nth = |stride: usize, first: usize| numbers.iter().skip(first).step_by(stride);
+        let placed_numbers: Vec<_> = placed_numbers.collect();
+        let select_numbers =
+            |stride: usize, first: usize| placed_numbers.iter().skip(first).step_by(stride);
         let labels_fit = |&(stride, first): &(usize, usize)| {
-            every_nth(stride, first).zip(every_nth(stride, first).skip(1)).all(
+            select_numbers(stride, first).zip(select_numbers(stride, first).skip(1)).all(
                 |(number, next_number)| {
                     (next_number.0 - number.0).abs()
                         >= (number.1 + next_number.1) / 2.0 + NUMBER_GAP
@@ -101,12 +107,12 @@ impl Panel {
             )
         };
         let candidates =
-            (1..=numbers.len()).flat_map(|stride| (0..stride).map(move |k| (stride, k)));
-        let best = candidates.filter(labels_fit).max_by_key(|&(stride, first)| {
-            (every_nth(stride, first).count(), std::cmp::Reverse((stride, first)))
+            (1..=placed_numbers.len()).flat_map(|stride| (0..stride).map(move |k| (stride, k)));
+        let best_selection = candidates.filter(labels_fit).max_by_key(|&(stride, first)| {
+            (select_numbers(stride, first).count(), std::cmp::Reverse((stride, first)))
         });
-        let Some((stride, first)) = best else { return Vec::new() };
-        every_nth(stride, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
+        let Some((stride, first)) = best_selection else { return Vec::new() };
+        select_numbers(stride, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
     }
 
     /// Draws the edge, ticks and numbers. An axis shared with the panel below or to the left has no
@@ -134,40 +140,41 @@ impl Panel {
         x_numbers: Vec<(f64, String)>,
         has_y_numbers: bool,
     ) {
-        let bottom = self.y + self.height;
-        let stroke = Stroke::solid(INK, 1.2);
-        scene.line(self.outline(), stroke.clone());
-        let mut marks = Outline::default();
+        let bottom_y = self.y + self.height;
+        let stroke = Stroke::new_solid(INK, 1.2);
+        scene.draw_line(self.outline(), stroke.clone());
+        let mut tick_marks = Outline::default();
         for tick in self.x_ticks() {
             let x = self.x_pixel(tick.value);
-            marks.add_line(&[[x, bottom], [x, bottom + 5.0]]);
+            tick_marks.add_line(&[[x, bottom_y], [x, bottom_y + 5.0]]);
         }
         for (x, number) in x_numbers {
-            let text = Text::new(number, [x, bottom + 21.0], TICK_SIZE);
-            scene.text(text.anchor(Anchor::Middle));
+            let text = Text::new(number, [x, bottom_y + 21.0], TICK_SIZE);
+            scene.draw_text(text.with_anchor(Anchor::Middle));
         }
         for tick in self.y_ticks() {
             let y = self.y_pixel(tick.value);
-            marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
+            tick_marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
             if has_y_numbers {
                 let position = [self.x - 9.0, y + 0.35 * TICK_SIZE];
-                scene.text(Text::new(tick.label, position, TICK_SIZE).anchor(Anchor::End));
+                scene
+                    .draw_text(Text::new(tick.label, position, TICK_SIZE).with_anchor(Anchor::End));
             }
         }
-        scene.line(marks, stroke);
+        scene.draw_line(tick_marks, stroke);
     }
 
     /// Writes a line of text in the middle of the panel: the reason for an empty panel.
     pub(crate) fn write_centred(&self, scene: &mut Scene, text: &str) {
         let position = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
-        let text = Text::new(text, position, LABEL_SIZE).anchor(Anchor::Middle);
-        scene.text(Text { colour: MUTED, ..text });
+        let text = Text::new(text, position, LABEL_SIZE).with_anchor(Anchor::Middle);
+        scene.draw_text(Text { colour: MUTED_COLOUR, ..text });
     }
 
     /// Writes the label of the x axis.
     pub(crate) fn draw_x_label(&self, scene: &mut Scene, label: &str) {
         let position = [self.x + self.width / 2.0, self.y + self.height + 44.0];
-        scene.text(Text::new(label, position, LABEL_SIZE).anchor(Anchor::Middle));
+        scene.draw_text(Text::new(label, position, LABEL_SIZE).with_anchor(Anchor::Middle));
     }
 
     /// Writes the label of the y axis, `distance` px left of the panel; in two lines if it is
@@ -176,8 +183,8 @@ impl Panel {
         let fits_height = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
         // A unit, in brackets, stays on one line.
         let words_end = label.rfind(" (").map_or(label.len(), |index| index + 1);
-        let spaces = label[..words_end].match_indices(' ').map(|(index, _)| index);
-        let break_index = { spaces }.rfind(|&index| fits_height(&label[..index]));
+        let space_indices = label[..words_end].match_indices(' ').map(|(index, _)| index);
+        let break_index = { space_indices }.rfind(|&index| fits_height(&label[..index]));
         let lines = match break_index {
             Some(index) if !fits_height(label) => vec![&label[..index], &label[index + 1..]],
             _ => vec![label],
@@ -185,7 +192,9 @@ impl Panel {
         let first_x = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
         for (k, line) in lines.into_iter().enumerate() {
             let position = [first_x + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
-            scene.text(Text::new(line, position, LABEL_SIZE).anchor(Anchor::Middle).rotated());
+            scene.draw_text(
+                Text::new(line, position, LABEL_SIZE).with_anchor(Anchor::Middle).with_rotation(),
+            );
         }
     }
 }
@@ -193,11 +202,12 @@ impl Panel {
 /// Writes the title, and below it the subtitle, shortened to fit.
 pub(crate) fn draw_heading(scene: &mut Scene, title: &str, subtitle: &str) {
     let max_width = scene.width - 40.0;
-    scene.text(
-        Text::new(cut_to_fit(title, TITLE_SIZE, true, max_width), [20.0, 32.0], TITLE_SIZE).bold(),
+    scene.draw_text(
+        Text::new(cut_to_fit(title, TITLE_SIZE, true, max_width), [20.0, 32.0], TITLE_SIZE)
+            .with_bold_face(),
     );
     let subtitle = cut_to_fit(subtitle, TICK_SIZE, false, max_width);
-    scene.text(Text { colour: MUTED, ..Text::new(subtitle, [20.0, 55.0], TICK_SIZE) });
+    scene.draw_text(Text { colour: MUTED_COLOUR, ..Text::new(subtitle, [20.0, 55.0], TICK_SIZE) });
 }
 
 /// Height of [`draw_heading`], px.
@@ -205,13 +215,14 @@ pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
 /// Returns `text`, cut short to fit `max_width` px.
 fn cut_to_fit(text: &str, size: f64, is_bold: bool, max_width: f64) -> String {
-    let mut shortened: String = text.to_owned();
-    while text_width(&shortened, size, is_bold) > max_width {
-        let kept_letters = shortened.trim_end_matches('…').chars().count().saturating_sub(1);
-        shortened =
-            shortened.chars().take(kept_letters).collect::<String>().trim_end().to_owned() + "…";
+    let mut shortened_text: String = text.to_owned();
+    while text_width(&shortened_text, size, is_bold) > max_width {
+        let kept_letters = shortened_text.trim_end_matches('…').chars().count().saturating_sub(1);
+        shortened_text =
+            shortened_text.chars().take(kept_letters).collect::<String>().trim_end().to_owned()
+                + "…";
     }
-    shortened
+    shortened_text
 }
 
 /// The symbol before a legend's text.
@@ -234,7 +245,7 @@ pub(crate) enum LegendSymbol {
 const LEGEND_ROW_HEIGHT: f64 = 25.0;
 
 /// Returns the height of a legend in `width` px, px.
-pub(crate) fn legend_height(entries: &[(LegendSymbol, String)], width: f64) -> f64 {
+pub(crate) fn measure_legend_height(entries: &[(LegendSymbol, String)], width: f64) -> f64 {
     LEGEND_ROW_HEIGHT * lay_out_legend(entries, width).last().map_or(0, |(_, row)| row + 1) as f64
 }
 
@@ -252,28 +263,28 @@ pub(crate) fn draw_legend(
         let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
         match symbol {
             LegendSymbol::Line(stroke) => {
-                scene.line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
+                scene.draw_line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
             }
             LegendSymbol::Area(colour) => {
-                scene.fill(area.clone(), *colour);
-                scene.line(area, Stroke::solid(MUTED, 1.0));
+                scene.fill_outline(area.clone(), *colour);
+                scene.draw_line(area, Stroke::new_solid(MUTED_COLOUR, 1.0));
             }
             LegendSymbol::Failed => draw_failed_area(scene, area),
             LegendSymbol::Hatched(hatch) => {
-                scene.hatch(area.clone(), hatch);
-                scene.line(area, Stroke::solid(MUTED, 1.0));
+                scene.fill_with_hatch(area.clone(), hatch);
+                scene.draw_line(area, Stroke::new_solid(MUTED_COLOUR, 1.0));
             }
             LegendSymbol::Undefined => draw_undefined_cells(scene, &[[x, y - 8.0, 28.0, 16.0]]),
             LegendSymbol::Shape(outline, is_filled, colour) => {
-                let outline = outline.translated([x + 14.0, y]);
+                let outline = outline.with_offset([x + 14.0, y]);
                 if *is_filled {
-                    scene.fill(outline, *colour);
+                    scene.fill_outline(outline, *colour);
                 } else {
-                    scene.line(outline, Stroke::solid(*colour, 1.4));
+                    scene.draw_line(outline, Stroke::new_solid(*colour, 1.4));
                 }
             }
         }
-        scene.text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));
+        scene.draw_text(Text::new(text.clone(), [x + 36.0, y + 0.35 * TICK_SIZE], TICK_SIZE));
     }
 }
 
@@ -295,32 +306,37 @@ fn lay_out_legend(entries: &[(LegendSymbol, String)], width: f64) -> Vec<(f64, u
 
 /// Draws an area of failed points: grey and hatched.
 pub(crate) fn draw_failed_area(scene: &mut Scene, area: Outline) {
-    scene.fill_crisp(area.clone(), FAILED);
-    scene.hatch(area, &failed_hatch());
+    scene.fill_crisply(area.clone(), FAILED_COLOUR);
+    scene.fill_with_hatch(area, &failed_hatch());
 }
 
 /// Returns the hatch of cells with failed points.
 pub(crate) fn failed_hatch() -> Hatch {
-    Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, is_falling: false }
+    Hatch { strokes: vec![Stroke::new_solid(INK, 1.2)], spacing: 9.0, is_falling: false }
 }
 
 /// Returns the hatch of cells with chaotic motion: light and dark lines, which show on every
 /// colour.
 pub(crate) fn sensitive_hatch() -> Hatch {
-    let strokes = vec![Stroke::solid(INK, 2.4), Stroke::solid(PAPER, 1.0)];
+    let strokes = vec![Stroke::new_solid(INK, 2.4), Stroke::new_solid(PAPER, 1.0)];
     Hatch { strokes, spacing: 7.0, is_falling: true }
 }
 
 /// Draws cells `[x, y, width, height]` of undefined points: white with a dot in the middle.
-pub(crate) fn draw_undefined_cells(scene: &mut Scene, cells: &[[f64; 4]]) {
+pub(crate) fn draw_undefined_cells(scene: &mut Scene, cell_areas: &[[f64; 4]]) {
     let mut areas = Outline::default();
     let mut dots = Outline::default();
-    for &[x, y, width, height] in cells {
+    for &[x, y, width, height] in cell_areas {
         areas.add_rectangle(x, y, width, height);
-        let side = 4.0_f64.min(0.4 * width.min(height));
-        dots.add_rectangle(x + (width - side) / 2.0, y + (height - side) / 2.0, side, side);
+        let dot_side = 4.0_f64.min(0.4 * width.min(height));
+        dots.add_rectangle(
+            x + (width - dot_side) / 2.0,
+            y + (height - dot_side) / 2.0,
+            dot_side,
+            dot_side,
+        );
     }
-    scene.fill_crisp(areas.clone(), PAPER);
-    scene.line(areas, Stroke::solid(FAINT, 1.0));
-    scene.fill(dots, MUTED);
+    scene.fill_crisply(areas.clone(), PAPER);
+    scene.draw_line(areas, Stroke::new_solid(FAINT_COLOUR, 1.0));
+    scene.fill_outline(dots, MUTED_COLOUR);
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::error::{PlotError, Result};
 use super::grid::Grid;
 use super::read::{ColumnFacts, FigureFile, FigureRow, is_ratio};
-use super::table::{FigureColumn, FigureTable, NO_WORD, SEVERAL_WORDS, Values, Words};
+use super::table::{ColumnValues, FigureColumn, FigureTable, NO_WORD, SEVERAL_WORDS, Words};
 use sweep_parameter::Worse;
 
 /// The least, the least positive and the greatest finite value of a column over all rows of a file.
@@ -42,13 +42,13 @@ impl ValueRange {
 pub(crate) struct PointCounts {
     pub(crate) points: u32,
     /// Points whose verdict is reliable.
-    pub(crate) reliable: u32,
+    pub(crate) reliable_points: u32,
     /// Points whose verdict is unreliable.
-    pub(crate) unreliable: u32,
+    pub(crate) unreliable_points: u32,
     /// Points whose status is not `ok`.
-    pub(crate) failed: u32,
+    pub(crate) failed_points: u32,
     /// Points whose motion is chaotic.
-    pub(crate) sensitive: u32,
+    pub(crate) sensitive_points: u32,
 }
 
 /// The sides of a limit on which the points of each cell lie.
@@ -59,7 +59,7 @@ pub(crate) struct CellSides {
     /// Whether a cell has points that did not fail and yet have no value.
     pub(crate) has_undefined: Vec<bool>,
     /// The mean of each cell's values; the geometric mean of ratios.
-    pub(crate) mean: Vec<f64>,
+    pub(crate) mean_values: Vec<f64>,
 }
 
 /// A map file collected into cells.
@@ -69,12 +69,12 @@ pub(crate) struct CellMap {
     pub(crate) table: FigureTable,
     pub(crate) grid: Grid,
     /// The number of points of each kind in each cell.
-    pub(crate) counts: Vec<PointCounts>,
+    pub(crate) point_counts: Vec<PointCounts>,
     /// The range of each column over all rows, and the sides of the column's limit in each cell. A
     /// column without a limit has no sides, and no column has sides if each cell is one point.
     pub(crate) ranges_and_sides: BTreeMap<String, (ValueRange, Option<CellSides>)>,
     /// The number of rows of the file by status.
-    pub(crate) statuses: BTreeMap<String, usize>,
+    pub(crate) rows_by_status: BTreeMap<String, usize>,
 }
 
 /// The status of a row whose file has none.
@@ -89,7 +89,7 @@ impl CellMap {
     /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::NotAGrid`] for two rows at one
     /// point.
     pub(crate) fn read(source: FigureFile, grid: Grid, columns: &[String]) -> Result<Self> {
-        let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
+        let names = grid.axes.iter().map(|axis| axis.swept_axis.name.as_str());
         let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
         let shown_facts: Vec<&ColumnFacts> =
             source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
@@ -97,14 +97,15 @@ impl CellMap {
             names.chain(shown_facts.iter().map(|facts| facts.name.as_str())).collect();
         let mut collector = CellCollector::new(&source, &grid, &shown_facts);
         source.each_row(&names, |row| collector.add(row))?;
-        let CellCollector { columns, counts, statuses, .. } = collector;
+        let CellCollector { columns, point_counts, rows_by_status, .. } = collector;
         let mut ranges_and_sides = BTreeMap::new();
         let mut figure_columns = Vec::with_capacity(columns.len());
-        for CellColumn { facts, mut values, range, sides, .. } in columns {
-            if let Values::Words(words) = &mut values {
+        for CellColumn { facts, mut values, value_range, sides, .. } in columns {
+            if let ColumnValues::Words(words) = &mut values {
                 words.sort();
             }
-            ranges_and_sides.insert(facts.name.clone(), (range, sides.map(SideCollector::finish)));
+            ranges_and_sides
+                .insert(facts.name.clone(), (value_range, sides.map(SideCollector::finish)));
             figure_columns.push(FigureColumn { facts: facts.clone(), values });
         }
         let table = FigureTable {
@@ -113,7 +114,7 @@ impl CellMap {
             source,
             bucket_rows: None,
         };
-        Ok(Self { table, grid, counts, ranges_and_sides, statuses })
+        Ok(Self { table, grid, point_counts, ranges_and_sides, rows_by_status })
     }
 
     /// Returns the cell at index `x` of the first axis, `y` of the second and `further_indices` of
@@ -124,7 +125,7 @@ impl CellMap {
 
     /// Returns whether the file has a point in the cell.
     pub(crate) fn has_points(&self, cell: usize) -> bool {
-        self.counts[cell].points > 0
+        self.point_counts[cell].points > 0
     }
 
     /// Returns the status of a cell's points; `None` if they differ.
@@ -138,7 +139,11 @@ impl CellMap {
 
     /// Returns the number of failed rows of the file.
     pub(crate) fn count_failed(&self) -> usize {
-        self.statuses.iter().filter(|(status, _)| *status != OK_STATUS).map(|(_, rows)| rows).sum()
+        self.rows_by_status
+            .iter()
+            .filter(|(status, _)| *status != OK_STATUS)
+            .map(|(_, rows)| rows)
+            .sum()
     }
 }
 
@@ -168,8 +173,8 @@ impl CellReduction {
 struct CellColumn<'a> {
     facts: &'a ColumnFacts,
     reduction: CellReduction,
-    values: Values,
-    range: ValueRange,
+    values: ColumnValues,
+    value_range: ValueRange,
     sides: Option<SideCollector>,
 }
 
@@ -205,14 +210,14 @@ impl SideCollector {
     }
 
     fn finish(self) -> CellSides {
-        let mean = |(sum, count): (f64, u32)| {
+        let to_mean = |(sum, count): (f64, u32)| {
             let mean = sum / f64::from(count);
             if self.is_log { mean.exp() } else { mean }
         };
         CellSides {
             is_divided: self.sides_reached.into_iter().map(|sides| sides == [true; 2]).collect(),
             has_undefined: self.has_undefined,
-            mean: self.sums.into_iter().map(mean).collect(),
+            mean_values: self.sums.into_iter().map(to_mean).collect(),
         }
     }
 }
@@ -222,13 +227,13 @@ struct CellCollector<'a> {
     source: &'a FigureFile,
     grid: &'a Grid,
     columns: Vec<CellColumn<'a>>,
-    counts: Vec<PointCounts>,
+    point_counts: Vec<PointCounts>,
     /// The first row of each cell.
     first_rows: Vec<usize>,
     /// The greatest ratio of each cell so far.
     greatest_ratios: Vec<f64>,
     /// The number of rows by status.
-    statuses: BTreeMap<String, usize>,
+    rows_by_status: BTreeMap<String, usize>,
     /// The last value of each axis and its index: rows in grid order repeat values.
     last_values: Vec<(f64, Option<usize>)>,
     /// The limit of the ratio, if the file has no verdicts.
@@ -241,10 +246,10 @@ impl<'a> CellCollector<'a> {
         let columns = columns.iter().map(|&facts| CellColumn {
             reduction: CellReduction::for_column(facts),
             values: match facts.is_number() {
-                true => Values::Numbers(vec![f64::NAN; cell_count]),
-                false => Values::Words(Words::none(cell_count)),
+                true => ColumnValues::Numbers(vec![f64::NAN; cell_count]),
+                false => ColumnValues::Words(Words::without_words(cell_count)),
             },
-            range: ValueRange::EMPTY,
+            value_range: ValueRange::EMPTY,
             // A cell of one point needs no sides: its value is its mean.
             sides: { source.column_limit(facts) }
                 .filter(|_| grid.merges_points())
@@ -255,10 +260,10 @@ impl<'a> CellCollector<'a> {
             source,
             grid,
             columns: columns.collect(),
-            counts: vec![PointCounts::default(); cell_count],
+            point_counts: vec![PointCounts::default(); cell_count],
             first_rows: vec![0; cell_count],
             greatest_ratios: vec![f64::NAN; cell_count],
-            statuses: BTreeMap::new(),
+            rows_by_status: BTreeMap::new(),
             last_values: vec![(f64::NAN, None); grid.axes.len()],
             ratio_limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
         }
@@ -279,9 +284,9 @@ impl<'a> CellCollector<'a> {
         let axis_count = self.last_values.len();
         let status = row.word(axis_count);
         let status_name = status.unwrap_or(UNKNOWN_STATUS);
-        match self.statuses.get_mut(status_name) {
+        match self.rows_by_status.get_mut(status_name) {
             Some(rows) => *rows += 1,
-            None => drop(self.statuses.insert(status_name.to_owned(), 1)),
+            None => drop(self.rows_by_status.insert(status_name.to_owned(), 1)),
         }
         let has_failed = status != Some(OK_STATUS);
         let is_worst = cell.map(|cell| self.count(cell, row, has_failed)).transpose()?;
@@ -295,12 +300,12 @@ impl<'a> CellCollector<'a> {
     /// far.
     fn count(&mut self, cell: usize, row: FigureRow<'_>, has_failed: bool) -> Result<bool> {
         let axis_count = self.last_values.len();
-        let counts = &mut self.counts[cell];
-        let holds_all = |points| counts.points as usize >= points;
-        if counts.points == 0 {
+        let point_counts = &mut self.point_counts[cell];
+        let holds_all = |points| point_counts.points as usize >= points;
+        if point_counts.points == 0 {
             self.first_rows[cell] = row.index();
         } else if self.grid.point_count(cell).is_some_and(holds_all) {
-            return Err(self.repeated_point(cell, row.index()));
+            return Err(self.repeated_point_error(cell, row.index()));
         }
         let [is_reliable, sensitive] = [1, 2].map(|k| row.word(axis_count + k));
         let ratio = row.number(axis_count + 3);
@@ -308,11 +313,11 @@ impl<'a> CellCollector<'a> {
             None => is_reliable.map(|word| word == "true"),
             Some(limit) => (!ratio.is_nan()).then_some(ratio < limit),
         };
-        counts.points += 1;
-        counts.failed += u32::from(has_failed);
-        counts.sensitive += u32::from(sensitive == Some("true"));
-        counts.reliable += u32::from(is_reliable == Some(true));
-        counts.unreliable += u32::from(is_reliable == Some(false));
+        point_counts.points += 1;
+        point_counts.failed_points += u32::from(has_failed);
+        point_counts.sensitive_points += u32::from(sensitive == Some("true"));
+        point_counts.reliable_points += u32::from(is_reliable == Some(true));
+        point_counts.unreliable_points += u32::from(is_reliable == Some(false));
         let greatest_ratio = &mut self.greatest_ratios[cell];
         let is_worst = ratio > *greatest_ratio || (greatest_ratio.is_nan() && !ratio.is_nan());
         if is_worst {
@@ -321,11 +326,11 @@ impl<'a> CellCollector<'a> {
         Ok(is_worst)
     }
 
-    fn repeated_point(&self, cell: usize, row: usize) -> PlotError {
-        let first = self.first_rows[cell];
+    fn repeated_point_error(&self, cell: usize, row: usize) -> PlotError {
+        let first_row = self.first_rows[cell];
         let reason = match self.grid.point_count(cell) {
-            Some(1) => format!("rows {first} and {row} are the same point"),
-            _ => format!("some rows between {first} and {row} are the same point"),
+            Some(1) => format!("rows {first_row} and {row} are the same point"),
+            _ => format!("some rows between {first_row} and {row} are the same point"),
         };
         PlotError::NotAGrid { path: self.source.path.clone(), reason }
     }
@@ -341,9 +346,9 @@ impl CellColumn<'_> {
         has_failed: bool,
     ) {
         match &mut self.values {
-            Values::Numbers(numbers) => {
+            ColumnValues::Numbers(numbers) => {
                 let value = row.number(column);
-                self.range.add(value);
+                self.value_range.add(value);
                 let Some((cell, is_worst)) = cell else { return };
                 let shown_value = numbers[cell];
                 let is_replaced = match self.reduction {
@@ -358,9 +363,9 @@ impl CellColumn<'_> {
                     sides.add(cell, value, has_failed);
                 }
             }
-            Values::Words(words) => {
+            ColumnValues::Words(words) => {
                 let Some((cell, is_worst)) = cell else { return };
-                let code = words.code(row.word(column));
+                let code = words.code_for(row.word(column));
                 let shown_value = &mut words.codes[cell];
                 if *shown_value == NO_WORD
                     || (self.reduction == CellReduction::AtGreatestRatio && is_worst)

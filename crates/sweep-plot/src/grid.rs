@@ -10,7 +10,7 @@ use super::swept::{MAX_AXIS_VALUES, SweptAxis};
 pub(crate) struct GridAxis {
     /// The parameter with its values.
     #[serde(flatten)]
-    pub(crate) swept: SweptAxis,
+    pub(crate) swept_axis: SweptAxis,
     /// The rising value of each cell; the middle of a block.
     pub(crate) values: Vec<f64>,
     /// The borders of the cells, one more than there are cells: halfway between neighbours.
@@ -35,13 +35,14 @@ enum CellLookup {
 
 impl GridAxis {
     /// Returns an axis whose cells are blocks of `size` neighbouring values.
-    fn in_blocks(axis: &SweptAxis, size: usize) -> Self {
+    fn with_blocks(axis: &SweptAxis, size: usize) -> Self {
         let coordinates = axis.coordinates(&axis.values);
         let last_index = coordinates.len() - 1;
-        let starts = (0..coordinates.len()).step_by(size);
+        let block_starts = (0..coordinates.len()).step_by(size);
         let block_ends: Vec<_> =
-            starts.map(|start| [start, (start + size - 1).min(last_index)]).collect();
-        let middle = |[from, to]: [usize; 2]| (coordinates[from] + coordinates[to]) / 2.0;
+            block_starts.map(|start| [start, (start + size - 1).min(last_index)]).collect();
+        let middle_coordinate =
+            |[from, to]: [usize; 2]| (coordinates[from] + coordinates[to]) / 2.0;
         let (first_half, last_half) = if last_index == 0 {
             // A single value gets a cell with a width, so that it is visible.
             let half_step = if axis.is_log || coordinates[0] == 0.0 {
@@ -52,31 +53,37 @@ impl GridAxis {
             (half_step, half_step)
         } else {
             (
-                middle([0, 1]) - coordinates[0],
-                coordinates[last_index] - middle([last_index - 1, last_index]),
+                middle_coordinate([0, 1]) - coordinates[0],
+                coordinates[last_index] - middle_coordinate([last_index - 1, last_index]),
             )
         };
         let mut borders = vec![coordinates[0] - first_half];
-        borders.extend(block_ends.windows(2).map(|pair| middle([pair[0][1], pair[1][0]])));
+        borders
+            .extend(block_ends.windows(2).map(|pair| middle_coordinate([pair[0][1], pair[1][0]])));
         borders.push(coordinates[last_index] + last_half);
         let borders = borders.into_iter().map(|border| axis.from_coordinate(border)).collect();
         let lookup = CellLookup::Blocks(size);
         if size == 1 {
             return Self { lookup, ..Self::new(axis, axis.values.clone(), borders) };
         }
-        let values = block_ends.iter().map(|block| axis.from_coordinate(middle(*block))).collect();
+        let values = block_ends
+            .iter()
+            .map(|block| axis.from_coordinate(middle_coordinate(*block)))
+            .collect();
         let spans = block_ends.iter().map(|block| block.map(|end| axis.values[end])).collect();
         Self { spans: Some(spans), lookup, ..Self::new(axis, values, borders) }
     }
 
     /// Returns an axis that is known by its range alone, in `count` equal cells.
-    fn in_equal_cells(axis: &SweptAxis, count: usize) -> Self {
+    fn with_equal_cells(axis: &SweptAxis, count: usize) -> Self {
         let coordinates = axis.coordinates(&axis.values);
-        let border =
+        let border_coordinate =
             |k: usize| coordinates[0] + (coordinates[1] - coordinates[0]) * k as f64 / count as f64;
-        let borders: Vec<f64> = (0..=count).map(|k| axis.from_coordinate(border(k))).collect();
-        let values =
-            (0..count).map(|k| axis.from_coordinate((border(k) + border(k + 1)) / 2.0)).collect();
+        let borders: Vec<f64> =
+            (0..=count).map(|k| axis.from_coordinate(border_coordinate(k))).collect();
+        let values = (0..count)
+            .map(|k| axis.from_coordinate((border_coordinate(k) + border_coordinate(k + 1)) / 2.0))
+            .collect();
         let spans = borders.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         Self { spans: Some(spans), ..Self::new(axis, values, borders) }
     }
@@ -84,35 +91,35 @@ impl GridAxis {
     /// Returns an axis with cells for some picked values.
     fn with_picks(axis: &SweptAxis, picks: &[usize]) -> Self {
         let values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
-        let shown = SweptAxis { values, ..axis.clone() };
-        Self { lookup: CellLookup::Picked, ..Self::in_blocks(&shown, 1) }
+        let axis_of_picks = SweptAxis { values, ..axis.clone() };
+        Self { lookup: CellLookup::Picked, ..Self::with_blocks(&axis_of_picks, 1) }
     }
 
     fn new(axis: &SweptAxis, values: Vec<f64>, borders: Vec<f64>) -> Self {
-        Self { swept: axis.clone(), values, borders, spans: None, lookup: CellLookup::Borders }
+        Self { swept_axis: axis.clone(), values, borders, spans: None, lookup: CellLookup::Borders }
     }
 
     /// Returns the scale from the first border to the last.
     pub(crate) fn scale(&self) -> AxisScale {
         AxisScale {
-            is_log: self.swept.is_log,
+            is_log: self.swept_axis.is_log,
             from: self.borders[0],
             to: self.borders[self.borders.len() - 1],
         }
     }
 
     pub(crate) fn label(&self) -> String {
-        label::with_unit(&self.swept.words, &self.swept.unit)
+        label::with_unit(&self.swept_axis.words, &self.swept_axis.unit)
     }
 
     /// Returns the coordinates of the cells along the axis: logarithms on a logarithmic axis.
     pub(crate) fn coordinates(&self) -> Vec<f64> {
-        self.swept.coordinates(&self.values)
+        self.swept_axis.coordinates(&self.values)
     }
 
     /// Returns the index of the cell of one of the axis' values; `None` if it is not shown.
     pub(crate) fn cell_index(&self, value: f64) -> Option<usize> {
-        let values = &self.swept.values;
+        let values = &self.swept_axis.values;
         let value_index = values.partition_point(|known| *known < value);
         match self.lookup {
             CellLookup::Blocks(size) => Some(value_index.min(values.len() - 1) / size),
@@ -132,7 +139,7 @@ impl GridAxis {
             return self.cell_index(value);
         }
         let value_on_axis = self
-            .swept
+            .swept_axis
             .values
             .iter()
             .find(|&&value_on_axis| SweptAxis::is_same_value(value_on_axis, value))?;
@@ -142,7 +149,7 @@ impl GridAxis {
     /// Returns the number of the axis' values in a cell; `None` if it is not known.
     fn value_count(&self, cell: usize) -> Option<usize> {
         match self.lookup {
-            CellLookup::Blocks(size) => Some(size.min(self.swept.values.len() - cell * size)),
+            CellLookup::Blocks(size) => Some(size.min(self.swept_axis.values.len() - cell * size)),
             CellLookup::Picked => Some(1),
             CellLookup::Borders => None,
         }
@@ -173,8 +180,8 @@ impl Grid {
         for (k, axis) in axes.iter().take(2).enumerate() {
             block_sizes[k] = axis.is_complete.then(|| counts[k].div_ceil(cell_counts[k]));
             grid_axes.push(match block_sizes[k] {
-                Some(size) => GridAxis::in_blocks(axis, size),
-                None => GridAxis::in_equal_cells(axis, cell_counts[k]),
+                Some(size) => GridAxis::with_blocks(axis, size),
+                None => GridAxis::with_equal_cells(axis, cell_counts[k]),
             });
         }
         let cut_axes = axes.iter().skip(2).zip(picks);
@@ -193,7 +200,7 @@ impl Grid {
     }
 
     /// Returns the index of a cell in grid order, from its index on each axis.
-    pub(crate) fn index(&self, cell_of_axes: impl IntoIterator<Item = usize>) -> usize {
+    pub(crate) fn flat_index(&self, cell_of_axes: impl IntoIterator<Item = usize>) -> usize {
         self.axes
             .iter()
             .zip(cell_of_axes)
@@ -203,21 +210,21 @@ impl Grid {
     /// Returns the index of the cell at `x` of the first axis, `y` of the second and
     /// `further_indices` of the others.
     pub(crate) fn cell(&self, x: usize, y: usize, further_indices: &[usize]) -> usize {
-        self.index([x, y].into_iter().chain(further_indices.iter().copied()))
+        self.flat_index([x, y].into_iter().chain(further_indices.iter().copied()))
     }
 
     /// Returns the number of grid points of a cell; `None` if it is not known.
     pub(crate) fn point_count(&self, cell: usize) -> Option<usize> {
-        let mut remaining = cell;
+        let mut remaining_index = cell;
         self.axes.iter().rev().try_fold(1, |points: usize, axis| {
-            let cell = remaining % axis.values.len();
-            remaining /= axis.values.len();
+            let cell = remaining_index % axis.values.len();
+            remaining_index /= axis.values.len();
             points.checked_mul(axis.value_count(cell)?)
         })
     }
 
     /// Returns the subtitle's note on cells of several points; `None` if each cell is one point.
-    pub(crate) fn note(&self) -> Option<String> {
+    pub(crate) fn merge_note(&self) -> Option<String> {
         let phrase = match self.block_sizes {
             [Some(1), Some(1)] => return None,
             [Some(columns), Some(1)] => format!("{columns} points"),
@@ -249,7 +256,7 @@ fn cells_along_axes(counts: [usize; 2], max_cells: usize) -> [usize; 2] {
 mod tests {
     use super::*;
 
-    fn axis(values: &[f64], is_log: bool) -> SweptAxis {
+    fn test_axis(values: &[f64], is_log: bool) -> SweptAxis {
         SweptAxis {
             name: String::new(),
             words: String::new(),
@@ -263,7 +270,7 @@ mod tests {
     #[test]
     fn borders_lie_halfway_between_values() {
         let borders = |values: &[f64], log_borders| {
-            GridAxis::in_blocks(&axis(values, log_borders), 1).borders
+            GridAxis::with_blocks(&test_axis(values, log_borders), 1).borders
         };
         assert_eq!(borders(&[1.0, 2.0, 4.0], false), [0.5, 1.5, 3.0, 5.0]);
         assert_eq!(borders(&[10.0], false), [9.5, 10.5]);
@@ -278,7 +285,7 @@ mod tests {
     #[test]
     fn each_value_lies_in_its_block() {
         let values: Vec<f64> = (0..10).map(f64::from).collect();
-        let blocks = GridAxis::in_blocks(&axis(&values, false), 4);
+        let blocks = GridAxis::with_blocks(&test_axis(&values, false), 4);
         assert_eq!(blocks.values, [1.5, 5.5, 8.5]);
         assert_eq!(blocks.borders, [-0.5, 3.5, 7.5, 9.5]);
         assert_eq!(blocks.spans, Some(vec![[0.0, 3.0], [4.0, 7.0], [8.0, 9.0]]));
@@ -291,8 +298,8 @@ mod tests {
 
     #[test]
     fn an_axis_known_by_its_range_has_equal_cells() {
-        let range = SweptAxis { is_complete: false, ..axis(&[0.0, 8.0], false) };
-        let axis_by_range = GridAxis::in_equal_cells(&range, 4);
+        let axis_with_range = SweptAxis { is_complete: false, ..test_axis(&[0.0, 8.0], false) };
+        let axis_by_range = GridAxis::with_equal_cells(&axis_with_range, 4);
         assert_eq!(axis_by_range.borders, [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert_eq!(
             [0.0, 1.9, 2.0, 7.9, 8.0].map(|value| axis_by_range.cell_index(value)),
@@ -303,7 +310,7 @@ mod tests {
 
     #[test]
     fn only_picked_values_have_a_cell() {
-        let axis_of_picks = GridAxis::with_picks(&axis(&[1.0, 2.0, 3.0, 4.0], false), &[0, 3]);
+        let axis_of_picks = GridAxis::with_picks(&test_axis(&[1.0, 2.0, 3.0, 4.0], false), &[0, 3]);
         assert_eq!(
             [1.0, 2.0, 3.0, 4.0].map(|value| axis_of_picks.cell_index(value)),
             [Some(0), None, None, Some(1)]

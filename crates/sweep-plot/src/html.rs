@@ -14,9 +14,11 @@ use std::rc::Rc;
 use serde_json::{Value, json};
 
 use super::axis::{AxisScale, MIN_TICKS, STEP_TOLERANCE, Tick, TickStep, log_tick_sets};
-use super::chart::{Chart, ChartPanel, DOT_RADIUS, Series, Style, series_stroke, x_scale, y_scale};
-use super::colour::{BOTH_SIDES, COLOUR_STEPS, FAILED, UNSTABLE_SHADE};
-use super::contour::MAX_POINTS;
+use super::chart::{
+    Chart, ChartPanel, DOT_RADIUS, Series, SeriesStyle, chart_x_scale, panel_y_scale, series_stroke,
+};
+use super::colour::{BOTH_SIDES_COLOUR, COLOUR_STEPS, FAILED_COLOUR, UNSTABLE_SHADE};
+use super::contour::MAX_LINE_POINTS;
 use super::cuts::Cuts;
 use super::error::Result;
 use super::frame::{LegendSymbol, failed_hatch};
@@ -92,9 +94,10 @@ pub(crate) fn map_page(
     let source = &map.table.source;
     let first_column = layer::requested_column(source, options)?;
     let columns = layer::all_columns(source);
-    let max_points = MAX_POINTS / columns.len();
-    let layers =
-        columns.iter().map(|column| Ok(layer_json(map, column, column.layer(map)?, max_points)));
+    let max_points = MAX_LINE_POINTS / columns.len();
+    let layers = columns
+        .iter()
+        .map(|column| Ok(layer_json(map, column, column.create_layer(map)?, max_points)));
     let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
         Some(folder) => histories::read_histories(folder, map, model)?,
@@ -104,7 +107,7 @@ pub(crate) fn map_page(
     let mut data = json!({
         "kind": "map",
         "title": title,
-        "subtitle": figures::map::subtitle(map, &cuts.notes),
+        "subtitle": figures::map::map_subtitle(map, &cuts.notes),
         "limit": source.ratio_limit(),
         "axes": map.grid.axes.iter().map(axis_json).collect::<Vec<_>>(),
         "columns": columns_json(&map.table),
@@ -112,12 +115,12 @@ pub(crate) fn map_page(
         "rows": rows_json(source),
         "layers": layers,
         "first": {
-            "column": first_column.as_ref().map_or(layer::STATUS, ShownColumn::name),
-            "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.other_picks),
+            "column": first_column.as_ref().map_or(layer::STATUS_COLUMN, ShownColumn::name),
+            "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.pick_positions),
         },
         "palettes": {
             "kinds": figures::map::status_colours(map),
-            "failed": FAILED.css(),
+            "failed": FAILED_COLOUR.css(),
         },
         "legend": legend_json(&figures::map::map_legend_entries(map, None)),
         "traces": traces,
@@ -125,7 +128,8 @@ pub(crate) fn map_page(
     if map.grid.merges_points() {
         data["counts"] = counts_json(map);
     }
-    let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.is_log));
+    let axes =
+        map.grid.axes.iter().map(|axis| (axis.swept_axis.name.as_str(), axis.swept_axis.is_log));
     let axes: Vec<(&str, bool)> = axes.collect();
     let summary = report::run_summary(source, model) + &report::cautions(map, model);
     let scripts = [
@@ -259,9 +263,9 @@ fn write_page(
     // The steps of linear ticks with the decimals of their labels, and the rule that chooses a
     // step.
     let steps: Value =
-        TickStep::all().map(|step| json!([step.length(), step.decimals()])).collect();
+        TickStep::all_steps().map(|step| json!([step.length(), step.decimals()])).collect();
     data["ticks"] = json!({ "steps": steps, "slack": STEP_TOLERANCE, "least": MIN_TICKS });
-    data["both"] = json!(BOTH_SIDES.css());
+    data["both"] = json!(BOTH_SIDES_COLOUR.css());
     data["shade"] = json!(format!("{}{:02x}", UNSTABLE_SHADE.css(), UNSTABLE_SHADE.alpha));
     // A brace in the file's text must not look like a placeholder.
     let escaped_texts = [summary, &provenance(source)].map(|text| text.replace('{', "&#123;"));
@@ -303,7 +307,7 @@ fn rows_json(source: &FigureFile) -> Value {
             "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
-    layer::quantities(source).into_iter().map(row_json).collect()
+    layer::collect_quantities(source).into_iter().map(row_json).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -342,14 +346,14 @@ fn codes_json(table: &FigureTable) -> Value {
 /// Returns the number of points of each kind in each cell.
 fn counts_json(map: &CellMap) -> Value {
     let encode_counts = |count: fn(&PointCounts) -> u32| {
-        embed::encode_floats(map.counts.iter().map(|cell| f64::from(count(cell))))
+        embed::encode_floats(map.point_counts.iter().map(|cell| f64::from(count(cell))))
     };
     json!({
         "points": encode_counts(|cell| cell.points),
-        "reliable": encode_counts(|cell| cell.reliable),
-        "unreliable": encode_counts(|cell| cell.unreliable),
-        "failed": encode_counts(|cell| cell.failed),
-        "sensitive": encode_counts(|cell| cell.sensitive),
+        "reliable": encode_counts(|cell| cell.reliable_points),
+        "unreliable": encode_counts(|cell| cell.unreliable_points),
+        "failed": encode_counts(|cell| cell.failed_points),
+        "sensitive": encode_counts(|cell| cell.sensitive_points),
     })
 }
 
@@ -369,7 +373,9 @@ fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
             "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
         }
         LegendSymbol::Area(colour) => format!("background:{}", colour.css()),
-        LegendSymbol::Failed => format!("{} {}", hatched_style(&failed_hatch()), FAILED.css()),
+        LegendSymbol::Failed => {
+            format!("{} {}", hatched_style(&failed_hatch()), FAILED_COLOUR.css())
+        }
         LegendSymbol::Hatched(hatch) => hatched_style(hatch),
         _ => "background:radial-gradient(circle,var(--muted) 2px,var(--paper) 2.5px);\
               outline:1px solid var(--faint)"
@@ -379,7 +385,7 @@ fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
 }
 
 fn layer_json(map: &CellMap, column: &ShownColumn, layer: Layer, max_points: usize) -> Value {
-    let (AxisScale { is_log, from, to }, limit) = (layer.scale.axis, layer.scale.centre);
+    let (AxisScale { is_log, from, to }, limit) = (layer.scale.axis_scale, layer.scale.centre);
     let middle = limit.unwrap_or(if is_log { (from * to).sqrt() } else { 0.5 * (from + to) });
     let colours = (0..COLOUR_STEPS).map(|step| layer.scale.colour(step).css());
     let ticks = layer.scale.ticks().into_iter().map(tick_json);
@@ -442,7 +448,7 @@ fn chart_json(chart: &Chart, encode_curve: fn(&[f64]) -> Value) -> Value {
     let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, encode_curve));
     let marks =
         chart.marks.iter().map(|mark| json!([embed::round_to_six_digits(mark.x), mark.label]));
-    let x_scale = x_scale(chart);
+    let x_scale = chart_x_scale(chart);
     let grids = grids.iter().map(|grid| embed::encode_floats(grid.iter().copied()));
     json!({
         "xWords": chart.x_label.words,
@@ -454,7 +460,7 @@ fn chart_json(chart: &Chart, encode_curve: fn(&[f64]) -> Value) -> Value {
         "panels": panels.collect::<Value>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
-        "shades": chart.shades,
+        "shades": chart.shaded_ranges,
         "shadeMeaning": chart.shade_meaning,
     })
 }
@@ -468,7 +474,7 @@ fn panel_json(
         json!([embed::round_to_six_digits(*x), embed::round_to_six_digits(*y), label])
     });
     let mut data = json!(panel);
-    data["ticks"] = log_ticks_json(y_scale(panel));
+    data["ticks"] = log_ticks_json(panel_y_scale(panel));
     data["stars"] = stars.collect();
     let encode_series = |series| series_json(series, grids, encode_curve);
     data["series"] = panel.series.iter().map(encode_series).collect();
@@ -481,9 +487,9 @@ fn series_json(
     encode_curve: fn(&[f64]) -> Value,
 ) -> Value {
     let stroke = series_stroke(series);
-    let is_dots = series.style == Style::Dots;
+    let is_dots = series.style == SeriesStyle::Dots;
     let [low, high] = match &series.style {
-        Style::Band(low, high) => [low, high].map(|side| encode_curve(side)),
+        SeriesStyle::Band(low, high) => [low, high].map(|side| encode_curve(side)),
         _ => [Value::Null, Value::Null],
     };
     json!({

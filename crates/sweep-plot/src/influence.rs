@@ -25,10 +25,10 @@ impl RankInfluence {
     pub(crate) fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let pairs = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
         let (x, y): (Vec<f64>, Vec<f64>) = pairs.unzip();
-        let x_ranks = ranks(&x);
-        let y_ranks = ranks(&y);
+        let x_ranks = compute_ranks(&x);
+        let y_ranks = compute_ranks(&y);
         Some(Self {
-            rank_correlation: correlation(&x_ranks, &y_ranks)?,
+            rank_correlation: compute_correlation(&x_ranks, &y_ranks)?,
             root_correlation_ratio: correlation_ratio(&x_ranks, &y_ranks),
         })
     }
@@ -46,14 +46,14 @@ pub(crate) fn chance_correlation(points: usize) -> f64 {
 }
 
 /// Returns the ranks from 1; equal values share the mean of their ranks.
-fn ranks(values: &[f64]) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+fn compute_ranks(values: &[f64]) -> Vec<f64> {
+    let mut sorted_indices: Vec<usize> = (0..values.len()).collect();
+    sorted_indices.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
-    for ties in order.chunk_by(|&a, &b| values[a] == values[b]) {
+    for ties in sorted_indices.chunk_by(|&a, &b| values[a] == values[b]) {
         // A run of m values after k others has the ranks k + 1 to k + m.
         let lower_count =
-            order.partition_point(|&other_index| values[other_index] < values[ties[0]]);
+            sorted_indices.partition_point(|&other_index| values[other_index] < values[ties[0]]);
         let rank = lower_count as f64 + (ties.len() + 1) as f64 / 2.0;
         ties.iter().for_each(|&index| ranks[index] = rank);
     }
@@ -61,12 +61,12 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the correlation of two lists of ranks; `None` if either is constant.
-fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
-    let mean = (x.len() + 1) as f64 / 2.0;
-    let sum = |term: &dyn Fn(usize) -> f64| (0..x.len()).map(term).sum::<f64>();
-    let covariance_sum = sum(&|k| (x[k] - mean) * (y[k] - mean));
-    let x_square_sum = sum(&|k| (x[k] - mean).powi(2));
-    let y_square_sum = sum(&|k| (y[k] - mean).powi(2));
+fn compute_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
+    let mean_rank = (x.len() + 1) as f64 / 2.0;
+    let sum_terms = |term: &dyn Fn(usize) -> f64| (0..x.len()).map(term).sum::<f64>();
+    let covariance_sum = sum_terms(&|k| (x[k] - mean_rank) * (y[k] - mean_rank));
+    let x_square_sum = sum_terms(&|k| (x[k] - mean_rank).powi(2));
+    let y_square_sum = sum_terms(&|k| (y[k] - mean_rank).powi(2));
     (x_square_sum > 0.0 && y_square_sum > 0.0)
         .then(|| covariance_sum / (x_square_sum * y_square_sum).sqrt())
 }
@@ -76,13 +76,13 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 const MAX_BINS: usize = 20;
 /// Minimum number of points to a bin. Basis: the mean of ten ranks is stable. Doubling it halves
 /// the bins of small designs.
-const MIN_IN_BIN: usize = 10;
+const MIN_BIN_POINTS: usize = 10;
 
 /// Returns the root of the corrected correlation ratio of ranks, over bins of equally many points.
 /// Equal values of `x` share a bin.
 fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
     let point_count = x.len();
-    let bin_count = (point_count / MIN_IN_BIN).min(MAX_BINS);
+    let bin_count = (point_count / MIN_BIN_POINTS).min(MAX_BINS);
     if bin_count < 2 {
         return None;
     }
@@ -92,32 +92,34 @@ fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
         let (count, sum) = &mut sums[bin_index.min(bin_count - 1)];
         (*count, *sum) = (*count + 1, *sum + y);
     }
-    let mean = (point_count + 1) as f64 / 2.0;
+    let mean_rank = (point_count + 1) as f64 / 2.0;
     let filled_bins: Vec<(usize, f64)> = sums.into_iter().filter(|(count, _)| *count > 0).collect();
-    let between_bins =
-        filled_bins.iter().map(|(count, sum)| *count as f64 * (sum / *count as f64 - mean).powi(2));
-    let total: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
+    let between_bins = filled_bins
+        .iter()
+        .map(|(count, sum)| *count as f64 * (sum / *count as f64 - mean_rank).powi(2));
+    let total_square_sum: f64 = y.iter().map(|y| (y - mean_rank).powi(2)).sum();
     let filled_count = filled_bins.len();
-    if filled_count < 2 || filled_count >= point_count || total <= 0.0 {
+    if filled_count < 2 || filled_count >= point_count || total_square_sum <= 0.0 {
         return None;
     }
-    let explained_share = between_bins.sum::<f64>() / total;
-    let corrected_share = 1.0
-        - (1.0 - explained_share) * (point_count - 1) as f64 / (point_count - filled_count) as f64;
-    Some(corrected_share.max(0.0).sqrt())
+    let explained_fraction = between_bins.sum::<f64>() / total_square_sum;
+    let corrected_fraction = 1.0
+        - (1.0 - explained_fraction) * (point_count - 1) as f64
+            / (point_count - filled_count) as f64;
+    Some(corrected_fraction.max(0.0).sqrt())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rising(count: i32) -> Vec<f64> {
+    fn rising_numbers(count: i32) -> Vec<f64> {
         (0..count).map(f64::from).collect()
     }
 
     #[test]
     fn equal_values_share_the_mean_of_their_ranks() {
-        assert_eq!(ranks(&[5.0, 1.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
+        assert_eq!(compute_ranks(&[5.0, 1.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
     }
 
     #[test]
@@ -132,9 +134,9 @@ mod tests {
 
     #[test]
     fn a_hill_has_a_correlation_ratio_but_no_rank_correlation() {
-        let x = rising(400);
-        let exponential: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
-        let influence = RankInfluence::new(&x, &exponential).unwrap();
+        let x = rising_numbers(400);
+        let exponential_values: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
+        let influence = RankInfluence::new(&x, &exponential_values).unwrap();
         assert!(
             influence.rank_correlation == 1.0 && influence.root_correlation_ratio.unwrap() > 0.99,
             "{influence:?}"
@@ -151,7 +153,7 @@ mod tests {
     #[test]
     fn an_independent_quantity_correlates_less_than_by_chance() {
         // Multiples of nearly the golden section modulo 1 have no order left.
-        let x = rising(400);
+        let x = rising_numbers(400);
         let y: Vec<f64> = x.iter().map(|x| (x * 0.618_033_988_749_895).fract()).collect();
         let influence = RankInfluence::new(&x, &y).unwrap();
         assert!(

@@ -164,13 +164,13 @@ pub fn format_significant(value: f64, digits: usize) -> String {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
     }
     // The exponent is taken after rounding: 9.996 to three digits is 10.0.
-    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
-    let exponent: i32 = scientific
+    let scientific_text = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 = scientific_text
         .split_once('e')
         .and_then(|(_, exponent_text)| exponent_text.parse().ok())
         .unwrap_or_default();
     if !(-4..7).contains(&exponent) {
-        return scientific;
+        return scientific_text;
     }
     let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or_default();
     trim_decimals(&format!("{value:.decimals$}")).to_owned()

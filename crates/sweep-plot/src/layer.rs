@@ -100,7 +100,7 @@ impl Layer {
 
     /// Returns the value that the line of the limit follows: the mean of the cell's points.
     pub(crate) fn mean_value(&self, cell: usize) -> f64 {
-        self.sides.as_ref().map_or(self.values[cell], |sides| sides.mean[cell])
+        self.sides.as_ref().map_or(self.values[cell], |sides| sides.mean_values[cell])
     }
 }
 
@@ -116,7 +116,7 @@ pub(crate) struct QuantityColumns<'a> {
 }
 
 /// Returns all quantities of a file but ratios: channels, then the others in file order.
-pub(crate) fn quantities(source: &FigureFile) -> Vec<QuantityColumns<'_>> {
+pub(crate) fn collect_quantities(source: &FigureFile) -> Vec<QuantityColumns<'_>> {
     let mut quantities: Vec<QuantityColumns<'_>> = Vec::new();
     for column in
         all_columns(source).into_iter().filter(|column| column.group != ColumnGroup::Ratio)
@@ -174,26 +174,30 @@ pub(crate) fn requested_columns(
         columns.truncate(1);
         return Ok(columns.into_iter().map(Some).collect());
     }
-    let known_names =
-        || columns.iter().map(ShownColumn::name).chain([STATUS]).collect::<Vec<_>>().join(", ");
+    let known_names = || {
+        columns.iter().map(ShownColumn::name).chain([STATUS_COLUMN]).collect::<Vec<_>>().join(", ")
+    };
     let find_by_name = |name: &String| match columns.iter().find(|column| column.name() == name) {
-        None if name == STATUS => Ok(None),
-        None => {
-            Err(source.unknown_name("--quantity", name, "column of numbers to show", known_names()))
-        }
+        None if name == STATUS_COLUMN => Ok(None),
+        None => Err(source.unknown_name_error(
+            "--quantity",
+            name,
+            "column of numbers to show",
+            known_names(),
+        )),
         column => Ok(column.cloned()),
     };
     options.quantity.iter().map(find_by_name).collect()
 }
 
 /// The column of each point's status.
-pub(crate) const STATUS: &str = "status";
+pub(crate) const STATUS_COLUMN: &str = "status";
 
 /// Returns all columns that a map file can show, in the order in which a page offers them: every
 /// column of numbers but axes and counts.
 pub(crate) fn all_columns(source: &FigureFile) -> Vec<ShownColumn> {
     let axes = super::swept::axis_columns(source);
-    let number_columns = source.numeric().filter(|column| {
+    let number_columns = source.number_columns().filter(|column| {
         let is_count = ["point", "steps_", "rejected_", "starts"];
         !axes.contains(column) && !is_count.iter().any(|prefix| column.name.starts_with(prefix))
     });
@@ -252,11 +256,11 @@ impl ShownColumn {
     ///
     /// # Errors
     /// [`PlotError::Undrawable`] if the file does not have the column.
-    pub(crate) fn layer(&self, map: &CellMap) -> Result<Layer> {
+    pub(crate) fn create_layer(&self, map: &CellMap) -> Result<Layer> {
         let values = map.table.numbers(self.name())?;
         let (unit, factor) = label::display_unit(self.facts.unit());
-        let (range, sides) = &map.ranges_and_sides[self.name()];
-        let range = range.values().map(|value| value * factor);
+        let (column_extremes, sides) = &map.ranges_and_sides[self.name()];
+        let column_extremes = column_extremes.values().map(|value| value * factor);
         let source = &map.table.source;
         let is_ratio = self.group == ColumnGroup::Ratio;
         // A linear model at rest gives an infinite ratio, which has no place on any scale.
@@ -266,14 +270,18 @@ impl ShownColumn {
         let is_less_worse = self.worse() == Some(Worse::Less);
         let scale = match (source.kind, source.column_limit(&self.facts)) {
             (FigureKind::DIFFERENCES, _) if self.name() == "ratio_change" => {
-                ColourScale::around_one(range)
+                ColourScale::for_factors(column_extremes)
             }
             (FigureKind::DIFFERENCES, _) if !is_ratio => {
-                ColourScale::around_zero(range, is_less_worse)
+                ColourScale::for_differences(column_extremes, is_less_worse)
             }
-            (_, Some(limit)) if is_ratio => ColourScale::ratio(range, limit, is_less_worse),
-            (_, Some(limit)) => ColourScale::with_limit(range, limit * factor, is_less_worse),
-            (_, None) => ColourScale::without_limit(range),
+            (_, Some(limit)) if is_ratio => {
+                ColourScale::for_ratios(column_extremes, limit, is_less_worse)
+            }
+            (_, Some(limit)) => {
+                ColourScale::with_limit(column_extremes, limit * factor, is_less_worse)
+            }
+            (_, None) => ColourScale::without_limit(column_extremes),
         };
         let (title, label) = self.title_and_label(source);
         let limit = self.dividing_limit(source);
@@ -286,7 +294,7 @@ impl ShownColumn {
             limit: limit.filter(|_| scale.centre.is_some()),
             scale,
             sides: sides.as_ref().map(|sides| CellSides {
-                mean: sides.mean.iter().map(|mean| mean * factor).collect(),
+                mean_values: sides.mean_values.iter().map(|mean| mean * factor).collect(),
                 ..sides.clone()
             }),
         })

@@ -43,13 +43,13 @@ pub mod together;
 use std::path::{Path, PathBuf};
 
 pub use axis::extremes;
-pub use colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
+pub use colour::{DISTINCT_COLOURS, FAILED_COLOUR, LINEAR_COLOUR, NONLINEAR_COLOUR};
 pub use error::PlotError;
 pub use html::{embed, html_table, printable_page};
 pub use label::{capitalise, format_significant, name_in_words, quantity_in_words};
 pub use model::{CommonFigures, Figures, LivePart};
-pub use scene::{Colour, INK, MUTED};
-pub use share::Share;
+pub use scene::{Colour, INK, MUTED_COLOUR};
+pub use share::ShareInterval;
 pub use svg::escape;
 
 use chart::Chart;
@@ -176,12 +176,12 @@ fn draw_figure(
         FigureKind::DESIGN => return draw_design(source, options, model, format),
         FigureKind::DIFFERENCES => return draw_differences(source, options, model, format),
         FigureKind::STUDY => {
-            let chart = figures::optimise::chart(&source)?;
+            let chart = figures::optimise::study_chart(&source)?;
             (source, chart)
         }
         FigureKind::BOUNDARY => {
             let table = FigureTable::read(source)?;
-            let chart = figures::boundary::chart(&table)?;
+            let chart = figures::boundary::boundary_chart(&table)?;
             (table.source, chart)
         }
         _ => model.chart(source, options)?,
@@ -199,7 +199,7 @@ fn write_chart(
 ) -> Result<Vec<u8>> {
     match format {
         Format::Html => Ok(html::chart_page(source, chart, axis, model).into_bytes()),
-        _ => encode_image(&chart::draw(chart), format),
+        _ => encode_image(&chart::draw_chart(chart), format),
     }
 }
 
@@ -224,9 +224,11 @@ fn draw_design(
         return Ok(html::design_page(&scatter, options, model).into_bytes());
     }
     let scene = match options.view {
-        Some(DesignView::Histogram) => chart::draw(&figures::histogram::chart(&scatter)),
-        Some(DesignView::Influence) => figures::influence::draw(&scatter),
-        _ => figures::matrix::draw(&scatter).0,
+        Some(DesignView::Histogram) => {
+            chart::draw_chart(&figures::histogram::histogram_chart(&scatter))
+        }
+        Some(DesignView::Influence) => figures::influence::draw_influence(&scatter),
+        _ => figures::matrix::draw_matrix(&scatter).0,
     };
     encode_image(&scene, format)
 }
@@ -241,28 +243,31 @@ fn draw_map(
     model: &dyn Figures,
     format: Format,
 ) -> Result<Vec<u8>> {
-    let axes = swept::axes(&source)?;
+    let axes = swept::read_axes(&source)?;
     if format != Format::Html && axes.len() > 1 {
         let shown_column = layer::requested_column(&source, options)?;
-        let columns =
-            shown_column.iter().map(|shown_column| shown_column.name()).chain([layer::STATUS]);
+        let columns = shown_column
+            .iter()
+            .map(|shown_column| shown_column.name())
+            .chain([layer::STATUS_COLUMN]);
         let columns: Vec<String> = columns.map(str::to_owned).collect();
         let cuts = Cuts::for_picture(&source, &axes, &options.fixed_values)?;
-        let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
+        let grid = Grid::new(&axes, &cuts.picked_indices, PICTURE_CELLS);
         let map = CellMap::read(source, grid, &columns)?;
         let overlay = options.boundary.as_ref();
         let overlay =
             overlay.map(|path| read_overlay(path, &axes, &map.table.source)).transpose()?;
-        let scene = figures::map::draw(&map, &cuts, shown_column.as_ref(), overlay.as_ref())?;
+        let scene =
+            figures::map::draw_map_scene(&map, &cuts, shown_column.as_ref(), overlay.as_ref())?;
         return encode_image(&scene, format);
     }
     let columns = html::page_columns(&source, &axes);
     let cell_limit = html::max_cells(columns.len());
     let cuts = Cuts::for_page(&source, &axes, &options.fixed_values, cell_limit)?;
-    let grid = Grid::new(&axes, &cuts.picks, cell_limit);
+    let grid = Grid::new(&axes, &cuts.picked_indices, cell_limit);
     let map = CellMap::read(source, grid, &columns)?;
     if axes.len() == 1 {
-        let chart = figures::curves::chart(&map, options)?;
+        let chart = figures::curves::curves_chart(&map, options)?;
         return write_chart(&map.table.source, &chart, &axes[0].name, model, format);
     }
     Ok(html::map_page(&map, &cuts, options, model)?.into_bytes())
@@ -277,7 +282,7 @@ fn read_overlay(path: &Path, axes: &[SweptAxis], map: &FigureFile) -> Result<Ove
         "`sweep boundary` writes a boundary file",
     )?;
     let table = FigureTable::read(source)?;
-    let overlay = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
+    let overlay = figures::boundary::boundary_overlay(&table, [&axes[0].name, &axes[1].name])?;
     let axes_as_point: NamedPoint = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
     let files = [(map, &axes_as_point), (&table.source, &axes_as_point)];
     together::check_agreement(
@@ -296,7 +301,7 @@ fn draw_differences(
     model: &dyn Figures,
     format: Format,
 ) -> Result<Vec<u8>> {
-    if format == Format::Html || swept::axes(&source)?.len() < 2 {
+    if format == Format::Html || swept::read_axes(&source)?.len() < 2 {
         let path = source.path.display();
         return Err(PlotError::Unfit(format!(
             "{path} is a differences file, which is drawn as .svg, .pdf or .png over two axes or \
@@ -308,9 +313,9 @@ fn draw_differences(
 
 fn encode_image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
     match format {
-        Format::Png => raster::write(scene, PNG_SCALE),
-        Format::Pdf => Ok(pdf::write(scene)),
-        _ => Ok(svg::write(scene).into_bytes()),
+        Format::Png => raster::write_png(scene, PNG_SCALE),
+        Format::Pdf => Ok(pdf::write_pdf(scene)),
+        _ => Ok(svg::write_svg(scene).into_bytes()),
     }
 }
 

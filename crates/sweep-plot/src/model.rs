@@ -29,7 +29,7 @@ pub trait Figures {
     /// # Errors
     /// The errors of reading and drawing it.
     fn chart(&self, source: FigureFile, _options: &PlotOptions) -> Result<(FigureFile, Chart)> {
-        Err(source.nothing_to_draw("this model has no figure of it"))
+        Err(source.nothing_to_draw_error("this model has no figure of it"))
     }
 
     /// Draws the chart of a point's trace beside a map.
@@ -37,7 +37,7 @@ pub trait Figures {
     /// # Errors
     /// The errors of drawing it.
     fn history(&self, trace: &FigureTable) -> Result<Chart> {
-        Err(trace.source.nothing_to_draw("this model has no figure of it"))
+        Err(trace.source.nothing_to_draw_error("this model has no figure of it"))
     }
 
     /// Returns the lines of a plan's summary about the model: heading and text.

@@ -25,13 +25,13 @@ const SEAM_WIDTH: f64 = 0.25;
 
 /// Returns the scene as the bytes of a PDF document of one page. The same scene gives the same
 /// bytes.
-pub(crate) fn write(scene: &Scene) -> Vec<u8> {
+pub(crate) fn write_pdf(scene: &Scene) -> Vec<u8> {
     let mut page = Page::default();
     let width = format_pixels(scene.width * POINTS_PER_PIXEL);
     let height = format_pixels(scene.height * POINTS_PER_PIXEL);
     // Scenes have y downwards.
     let scale = POINTS_PER_PIXEL;
-    page.add(&format!("{scale} 0 0 -{scale} 0 {height} cm 1 j"));
+    page.add_operators(&format!("{scale} 0 0 -{scale} 0 {height} cm 1 j"));
     scene.items.iter().for_each(|item| page.add_item(item));
     let mut objects = Objects::default();
     let catalogue_object = objects.reserve();
@@ -50,9 +50,13 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
         format!("/A{alpha} << /ca {opacity} /CA {opacity} >>")
     });
     let graphics_states: Vec<String> = graphics_states.collect();
-    objects.set(catalogue_object, &format!("<< /Type /Catalog /Pages {pages_object} 0 R >>"));
-    objects.set(pages_object, &format!("<< /Type /Pages /Kids [{page_object} 0 R] /Count 1 >>"));
-    objects.set(
+    objects
+        .set_object(catalogue_object, &format!("<< /Type /Catalog /Pages {pages_object} 0 R >>"));
+    objects.set_object(
+        pages_object,
+        &format!("<< /Type /Pages /Kids [{page_object} 0 R] /Count 1 >>"),
+    );
+    objects.set_object(
         page_object,
         &format!(
             "<< /Type /Page /Parent {pages_object} 0 R /MediaBox [0 0 {width} {height}] /Contents \
@@ -63,7 +67,7 @@ pub(crate) fn write(scene: &Scene) -> Vec<u8> {
     );
     let title = hexadecimal_utf_16(&scene.description);
     let information_object =
-        objects.add(&format!("<< /Title <FEFF{title}> /Producer (sweep plot) >>"));
+        objects.add_object(&format!("<< /Title <FEFF{title}> /Producer (sweep plot) >>"));
     objects.finish(catalogue_object, information_object)
 }
 
@@ -83,7 +87,7 @@ struct Page {
 
 impl Page {
     /// Adds a line of operators.
-    fn add(&mut self, operators: &str) {
+    fn add_operators(&mut self, operators: &str) {
         self.operators.push_str(operators);
         self.operators.push('\n');
     }
@@ -94,7 +98,7 @@ impl Page {
                 self.set_colour(*colour);
                 let mut fill_operator = "f";
                 if *is_crisp && colour.alpha == 255 {
-                    self.add(&format!("[] 0 d {} w", format_pixels(SEAM_WIDTH)));
+                    self.add_operators(&format!("[] 0 d {} w", format_pixels(SEAM_WIDTH)));
                     fill_operator = "B";
                 }
                 self.add_path(outline, fill_operator);
@@ -103,27 +107,31 @@ impl Page {
                 let Stroke { colour, width, dash } = stroke;
                 self.set_colour(*colour);
                 let dash: Vec<String> = dash.iter().map(|length| format_pixels(*length)).collect();
-                self.add(&format!("[{}] 0 d {} w", dash.join(" "), format_pixels(*width)));
+                self.add_operators(&format!(
+                    "[{}] 0 d {} w",
+                    dash.join(" "),
+                    format_pixels(*width)
+                ));
                 self.add_path(outline, "S");
             }
             SceneItem::Text(text) => self.add_text(text),
             SceneItem::Clip(outline) => {
-                self.add("q");
+                self.add_operators("q");
                 if outline.0.is_empty() {
-                    self.add("0 0 0 0 re");
+                    self.add_operators("0 0 0 0 re");
                 }
                 self.add_path(outline, "W n");
             }
-            SceneItem::Unclip => self.add("Q"),
+            SceneItem::Unclip => self.add_operators("Q"),
         }
     }
 
     /// Sets the colour of areas and lines.
     fn set_colour(&mut self, colour: Colour) {
         self.alphas.insert(colour.alpha);
-        let component = |value: u8| format!("{:.4}", f64::from(value) / 255.0);
-        let [r, g, b] = colour.rgb.map(component);
-        self.add(&format!("/A{} gs {r} {g} {b} rg {r} {g} {b} RG", colour.alpha));
+        let format_component = |value: u8| format!("{:.4}", f64::from(value) / 255.0);
+        let [r, g, b] = colour.rgb.map(format_component);
+        self.add_operators(&format!("/A{} gs {r} {g} {b} rg {r} {g} {b} RG", colour.alpha));
     }
 
     /// Adds an outline and the operator that paints it.
@@ -151,15 +159,15 @@ impl Page {
                 }
             }
         }
-        self.add(operator);
+        self.add_operators(operator);
     }
 
     fn add_text(&mut self, text: &Text) {
-        let face = typeface(text.is_bold);
+        let font_face = typeface(text.is_bold);
         let glyphs = self.glyphs.entry(text.is_bold).or_default();
         let mut glyph_codes = String::new();
         for letter in text.text.chars() {
-            let GlyphId(glyph) = face.glyph_index(letter).unwrap_or_default();
+            let GlyphId(glyph) = font_face.glyph_index(letter).unwrap_or_default();
             glyphs.insert(glyph, letter);
             let _ = write!(glyph_codes, "{glyph:04X}");
         }
@@ -170,23 +178,23 @@ impl Page {
             Anchor::End => width,
         };
         let [x, y] = text.position;
-        let matrix = if text.is_rotated {
+        let text_matrix = if text.is_rotated {
             format!("0 -1 -1 0 {} {}", format_pixels(x), format_pixels(y + anchor_offset))
         } else {
             format!("1 0 0 -1 {} {}", format_pixels(x - anchor_offset), format_pixels(y))
         };
         let size = format_pixels(text.size);
         let font = font_name(text.is_bold);
-        let text_operators = format!("/{font} {size} Tf {matrix} Tm <{glyph_codes}> Tj ET");
+        let text_operators = format!("/{font} {size} Tf {text_matrix} Tm <{glyph_codes}> Tj ET");
         if let Some(halo) = text.halo {
             self.set_colour(halo);
-            self.add(&format!(
+            self.add_operators(&format!(
                 "[] 0 d {} w BT 1 Tr {text_operators}",
                 format_pixels(halo_width(text.size))
             ));
         }
         self.set_colour(text.colour);
-        self.add(&format!("BT 0 Tr {text_operators}"));
+        self.add_operators(&format!("BT 0 Tr {text_operators}"));
     }
 }
 
@@ -207,12 +215,12 @@ impl Objects {
         self.0.len()
     }
 
-    fn set(&mut self, number: usize, content: &str) {
+    fn set_object(&mut self, number: usize, content: &str) {
         self.0[number - 1] = content.as_bytes().to_vec();
     }
 
     /// Adds an object and returns its number.
-    fn add(&mut self, content: &str) -> usize {
+    fn add_object(&mut self, content: &str) -> usize {
         self.0.push(content.as_bytes().to_vec());
         self.0.len()
     }
@@ -235,59 +243,59 @@ impl Objects {
     /// Adds the plain or the bold font with the widths and letters of its glyphs; returns the
     /// number of its object.
     fn add_font(&mut self, is_bold: bool, glyphs: &BTreeMap<u16, char>) -> usize {
-        let face = typeface(is_bold);
-        let units = f64::from(face.units_per_em());
-        let thousandths = |value: f64| (1000.0 * value / units).round() as i64;
-        let bytes = if is_bold { BOLD_FONT } else { REGULAR_FONT };
-        let file = self.add_stream(&format!("/Length1 {} ", bytes.len()), bytes);
+        let font_face = typeface(is_bold);
+        let units = f64::from(font_face.units_per_em());
+        let to_thousandths = |value: f64| (1000.0 * value / units).round() as i64;
+        let font_bytes = if is_bold { BOLD_FONT } else { REGULAR_FONT };
+        let font_file = self.add_stream(&format!("/Length1 {} ", font_bytes.len()), font_bytes);
         let name = if is_bold { "SWEEPP+NotoSans-Bold" } else { "SWEEPP+NotoSans-Regular" };
-        let bounds = face.global_bounding_box();
+        let bounds = font_face.global_bounding_box();
         let [left, bottom, right, top] = [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max]
-            .map(|value| thousandths(f64::from(value)));
-        let ascent = thousandths(f64::from(face.ascender()));
-        let descent = thousandths(f64::from(face.descender()));
-        let capital_height = face.capital_height().unwrap_or(face.ascender());
-        let capital_height = thousandths(f64::from(capital_height));
-        let descriptor = self.add(&format!(
+            .map(|value| to_thousandths(f64::from(value)));
+        let ascent = to_thousandths(f64::from(font_face.ascender()));
+        let descent = to_thousandths(f64::from(font_face.descender()));
+        let capital_height = font_face.capital_height().unwrap_or(font_face.ascender());
+        let capital_height = to_thousandths(f64::from(capital_height));
+        let font_descriptor = self.add_object(&format!(
             "<< /Type /FontDescriptor /FontName /{name} /Flags 4 /FontBBox [{left} {bottom} \
              {right} {top}] /ItalicAngle 0 /Ascent {ascent} /Descent {descent} /CapHeight \
-             {capital_height} /StemV {} /FontFile2 {file} 0 R >>",
+             {capital_height} /StemV {} /FontFile2 {font_file} 0 R >>",
             if is_bold { 140 } else { 80 }
         ));
-        let mut widths = String::new();
-        let mut letters = String::new();
+        let mut width_entries = String::new();
+        let mut character_entries = String::new();
         for (glyph, letter) in glyphs {
-            let width = thousandths(f64::from(glyph_advance(face, *letter)));
-            let _ = write!(widths, "{glyph} [{width}] ");
+            let width = to_thousandths(f64::from(glyph_advance(font_face, *letter)));
+            let _ = write!(width_entries, "{glyph} [{width}] ");
             let code = hexadecimal_utf_16(&letter.to_string());
-            let _ = writeln!(letters, "1 beginbfchar <{glyph:04X}> <{code}> endbfchar");
+            let _ = writeln!(character_entries, "1 beginbfchar <{glyph:04X}> <{code}> endbfchar");
         }
-        let descendant = self.add(&format!(
+        let descendant_font = self.add_object(&format!(
             "<< /Type /Font /Subtype /CIDFontType2 /BaseFont /{name} /CIDSystemInfo << /Registry \
-             (Adobe) /Ordering (Identity) /Supplement 0 >> /FontDescriptor {descriptor} 0 R \
-             /CIDToGIDMap /Identity /DW 0 /W [{widths}] >>"
+             (Adobe) /Ordering (Identity) /Supplement 0 >> /FontDescriptor {font_descriptor} 0 R \
+             /CIDToGIDMap /Identity /DW 0 /W [{width_entries}] >>"
         ));
         let character_map = format!(
             "/CIDInit /ProcSet findresource begin\n12 dict begin\nbegincmap\n/CIDSystemInfo << \
              /Registry (Adobe) /Ordering (UCS) /Supplement 0 >> def\n/CMapName \
              /Adobe-Identity-UCS def\n/CMapType 2 def\n1 begincodespacerange <0000> <FFFF> \
-             endcodespacerange\n{letters}endcmap\nCMapName currentdict /CMap defineresource \
-             pop\nend\nend\n"
+             endcodespacerange\n{character_entries}endcmap\nCMapName currentdict /CMap \
+             defineresource pop\nend\nend\n"
         );
         let character_map = self.add_stream("", character_map.as_bytes());
-        self.add(&format!(
+        self.add_object(&format!(
             "<< /Type /Font /Subtype /Type0 /BaseFont /{name} /Encoding /Identity-H \
-             /DescendantFonts [{descendant} 0 R] /ToUnicode {character_map} 0 R >>"
+             /DescendantFonts [{descendant_font} 0 R] /ToUnicode {character_map} 0 R >>"
         ))
     }
 
     /// Returns the document: the objects, and the table of their positions.
     fn finish(self, catalogue_object: usize, information_object: usize) -> Vec<u8> {
         let mut bytes = PDF_START.to_vec();
-        let mut table = String::new();
+        let mut offset_table = String::new();
         for (k, object) in self.0.iter().enumerate() {
             // Every entry of the table has 20 bytes.
-            let _ = writeln!(table, "{:010} 00000 n ", bytes.len());
+            let _ = writeln!(offset_table, "{:010} 00000 n ", bytes.len());
             bytes.extend(format!("{} 0 obj\n", k + 1).bytes());
             bytes.extend(object);
             bytes.extend(b"\nendobj\n");
@@ -295,7 +303,7 @@ impl Objects {
         let table_offset = bytes.len();
         let count = self.0.len() + 1;
         let trailer = format!(
-            "xref\n0 {count}\n0000000000 65535 f \n{table}trailer\n<< /Size {count} /Root \
+            "xref\n0 {count}\n0000000000 65535 f \n{offset_table}trailer\n<< /Size {count} /Root \
              {catalogue_object} 0 R /Info {information_object} 0 R \
              >>\nstartxref\n{table_offset}\n%%EOF\n"
         );
@@ -318,21 +326,23 @@ mod tests {
     use super::*;
     use crate::scene::INK;
 
-    fn scene() -> Scene {
+    fn test_scene() -> Scene {
         let mut scene = Scene::new(200.0, 100.0, "a test & more");
         let area = Outline::rectangle(10.0, 10.0, 50.0, 20.0);
-        scene.fill_crisp(area.clone(), Colour::hex(0x336699));
-        scene.clipped(area, |scene| {
+        scene.fill_crisply(area.clone(), Colour::hex(0x336699));
+        scene.draw_clipped(area, |scene| {
             let line = Outline::line(&[[0.0, 0.0], [0.001, 0.0], [60.0, 40.0]]);
-            scene.line(line, Stroke::dashed(INK.with_alpha(128), 1.5, &[4.0, 2.0]));
+            scene.draw_line(line, Stroke::new_dashed(INK.with_alpha(128), 1.5, &[4.0, 2.0]));
         });
-        scene.text(Text::new("Ω (x)", [20.0, 80.0], 12.0).bold());
-        scene.text(Text::new("yaw", [20.0, 80.0], 12.0).rotated().anchor(Anchor::Middle));
+        scene.draw_text(Text::new("Ω (x)", [20.0, 80.0], 12.0).with_bold_face());
+        scene.draw_text(
+            Text::new("yaw", [20.0, 80.0], 12.0).with_rotation().with_anchor(Anchor::Middle),
+        );
         scene
     }
 
     /// Returns the unpacked streams.
-    fn streams(document: &[u8]) -> Vec<Vec<u8>> {
+    fn unpack_streams(document: &[u8]) -> Vec<Vec<u8>> {
         let find_pattern = |offset: usize, pattern: &[u8]| {
             document[offset..]
                 .windows(pattern.len())
@@ -344,9 +354,9 @@ mod tests {
         while let Some(start) = find_pattern(offset, b">>\nstream\n") {
             let start = start + 10;
             let end = find_pattern(start, b"\nendstream").unwrap();
-            let mut unpacked = Vec::new();
-            ZlibDecoder::new(&document[start..end]).read_to_end(&mut unpacked).unwrap();
-            contents.push(unpacked);
+            let mut unpacked_bytes = Vec::new();
+            ZlibDecoder::new(&document[start..end]).read_to_end(&mut unpacked_bytes).unwrap();
+            contents.push(unpacked_bytes);
             offset = end;
         }
         contents
@@ -354,7 +364,7 @@ mod tests {
 
     #[test]
     fn every_object_is_at_its_position_in_the_table() {
-        let document = write(&scene());
+        let document = write_pdf(&test_scene());
         let text = String::from_utf8_lossy(&document);
         let table = text.rfind("xref\n0 ").unwrap();
         let entries = text[table..].lines().skip(2).filter(|line| line.ends_with(" 00000 n "));
@@ -373,13 +383,13 @@ mod tests {
             .parse()
             .unwrap();
         assert!(document[offset..].starts_with(b"xref\n"));
-        assert_eq!(document, write(&scene()));
+        assert_eq!(document, write_pdf(&test_scene()));
     }
 
     #[test]
     fn shapes_and_letters_are_in_the_page() {
-        let document = write(&scene());
-        let streams = streams(&document);
+        let document = write_pdf(&test_scene());
+        let streams = unpack_streams(&document);
         let page = String::from_utf8_lossy(&streams[0]).into_owned();
         for operators in [
             "0.75 0 0 -0.75 0 75 cm",

@@ -30,8 +30,8 @@ pub(crate) fn typeface(is_bold: bool) -> &'static Face<'static> {
 /// Returns the width of `text` in type `size` px high, px.
 pub(crate) fn text_width(text: &str, size: f64, is_bold: bool) -> f64 {
     let face = typeface(is_bold);
-    let advances: u32 = text.chars().map(|letter| u32::from(glyph_advance(face, letter))).sum();
-    f64::from(advances) * size / f64::from(face.units_per_em())
+    let advance_sum: u32 = text.chars().map(|letter| u32::from(glyph_advance(face, letter))).sum();
+    f64::from(advance_sum) * size / f64::from(face.units_per_em())
 }
 
 pub(crate) fn glyph_advance(face: &Face<'_>, letter: char) -> u16 {
@@ -43,14 +43,18 @@ pub(crate) fn glyph_advance(face: &Face<'_>, letter: char) -> u16 {
 ///
 /// # Errors
 /// [`PlotError::Drawing`] if the image would be too large to hold.
-pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
-    let size = [(scene.width * scale).ceil() as u32, (scene.height * scale).ceil() as u32];
-    let size_error =
-        || PlotError::Drawing(format!("no room for an image of {} by {} pixels", size[0], size[1]));
+pub(crate) fn write_png(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
+    let size_px = [(scene.width * scale).ceil() as u32, (scene.height * scale).ceil() as u32];
+    let size_error = || {
+        PlotError::Drawing(format!(
+            "no room for an image of {} by {} pixels",
+            size_px[0], size_px[1]
+        ))
+    };
     let mut canvas = Canvas {
-        pixmap: Pixmap::new(size[0], size[1]).ok_or_else(size_error)?,
+        pixmap: Pixmap::new(size_px[0], size_px[1]).ok_or_else(size_error)?,
         transform: Transform::from_scale(scale as f32, scale as f32),
-        clips: Vec::new(),
+        clip_masks: Vec::new(),
     };
     for item in &scene.items {
         match item {
@@ -61,10 +65,10 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
             SceneItem::Text(text) => canvas.draw_text(text),
             SceneItem::Clip(outline) => {
                 let mask = canvas.intersect_clip(outline).ok_or_else(size_error)?;
-                canvas.clips.push(mask);
+                canvas.clip_masks.push(mask);
             }
             SceneItem::Unclip => {
-                canvas.clips.pop();
+                canvas.clip_masks.pop();
             }
         }
     }
@@ -77,15 +81,15 @@ pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
 struct Canvas {
     pixmap: Pixmap,
     transform: Transform,
-    clips: Vec<Mask>,
+    clip_masks: Vec<Mask>,
 }
 
 impl Canvas {
     fn fill_outline(&mut self, outline: &Outline, colour: Colour, anti_alias: bool) {
         if let Some(path) = skia_path(outline) {
             let paint = skia_paint(colour, anti_alias);
-            let clip = self.clips.last();
-            self.pixmap.fill_path(&path, &paint, FillRule::Winding, self.transform, clip);
+            let clip_mask = self.clip_masks.last();
+            self.pixmap.fill_path(&path, &paint, FillRule::Winding, self.transform, clip_mask);
         }
     }
 
@@ -97,12 +101,18 @@ impl Canvas {
                 ..solid_stroke(stroke.width)
             };
             let paint = skia_paint(stroke.colour, true);
-            self.pixmap.stroke_path(&path, &paint, &skia_stroke, self.transform, self.clips.last());
+            self.pixmap.stroke_path(
+                &path,
+                &paint,
+                &skia_stroke,
+                self.transform,
+                self.clip_masks.last(),
+            );
         }
     }
 
     fn intersect_clip(&self, outline: &Outline) -> Option<Mask> {
-        let mut mask = match self.clips.last() {
+        let mut mask = match self.clip_masks.last() {
             Some(outer) => outer.clone(),
             None => {
                 let mut full_mask = Mask::new(self.pixmap.width(), self.pixmap.height())?;
@@ -140,17 +150,17 @@ impl Canvas {
             Transform::identity()
         };
         let transform = self.transform.pre_concat(translation).pre_concat(rotation);
-        let clip = self.clips.last();
+        let clip_mask = self.clip_masks.last();
         if let Some(halo) = text.halo {
             let style = solid_stroke(halo_width(text.size));
-            self.pixmap.stroke_path(&path, &skia_paint(halo, true), &style, transform, clip);
+            self.pixmap.stroke_path(&path, &skia_paint(halo, true), &style, transform, clip_mask);
         }
         self.pixmap.fill_path(
             &path,
             &skia_paint(text.colour, true),
             FillRule::Winding,
             transform,
-            clip,
+            clip_mask,
         );
     }
 }

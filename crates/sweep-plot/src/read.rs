@@ -23,10 +23,10 @@ pub struct FigureKind {
     /// The name, as in "a map file".
     pub name: &'static str,
     /// The columns that identify the kind. Axes stand before the first of these.
-    pub columns: &'static [&'static str],
+    pub required_columns: &'static [&'static str],
     /// The prefixes of names, if any: a file of the kind also has a column whose name begins with
     /// one of them.
-    pub prefixes: &'static [&'static str],
+    pub required_prefixes: &'static [&'static str],
     /// Whether the rows belong to points, which `--at` chooses.
     pub has_points: bool,
 }
@@ -42,14 +42,14 @@ impl FigureKind {
     pub const STUDY: Self = Self::new("study", &["candidate", "on_front"]);
     /// Time histories of both models at one point, or of a measurement and the fitted model.
     pub const TRACE: Self =
-        Self { prefixes: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
+        Self { required_prefixes: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
     /// The curve on which a quantity is at its limit. A file of this kind has the two columns of a
     /// bracket.
     pub const BOUNDARY: Self = Self::new("boundary", &[]);
 
     /// Returns a kind that these columns identify.
-    pub const fn new(name: &'static str, columns: &'static [&'static str]) -> Self {
-        Self { name, columns, prefixes: &[], has_points: false }
+    pub const fn new(name: &'static str, required_columns: &'static [&'static str]) -> Self {
+        Self { name, required_columns, required_prefixes: &[], has_points: false }
     }
 
     /// Returns the kind with rows that belong to points.
@@ -58,10 +58,11 @@ impl FigureKind {
     }
 
     fn matches_columns(&self, names: &[&str]) -> bool {
-        let has_prefix = |name: &&str| self.prefixes.iter().any(|prefix| name.starts_with(prefix));
-        self.columns.iter().all(|name| names.contains(name))
-            && (self.prefixes.is_empty() || names.iter().any(has_prefix))
-            && (!self.columns.is_empty() || bracket_columns(names).is_some())
+        let has_prefix =
+            |name: &&str| self.required_prefixes.iter().any(|prefix| name.starts_with(prefix));
+        self.required_columns.iter().all(|name| names.contains(name))
+            && (self.required_prefixes.is_empty() || names.iter().any(has_prefix))
+            && (!self.required_columns.is_empty() || bracket_columns(names).is_some())
     }
 }
 
@@ -133,7 +134,7 @@ impl FigureFile {
                 model_kinds.all_kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
             ),
         })?;
-        let run_name = run_name(&provenance);
+        let run_name = compose_run_name(&provenance);
         Ok(Self {
             path: path.to_owned(),
             kind,
@@ -165,18 +166,18 @@ impl FigureFile {
 
     /// Returns the columns of numbers whose name starts with `prefix`, with the rest of the name.
     pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
-        self.numeric()
+        self.number_columns()
             .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
             .collect()
     }
 
     /// Yields the columns of numbers.
-    pub fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
+    pub fn number_columns(&self) -> impl Iterator<Item = &ColumnFacts> {
         self.columns.iter().filter(|column| column.is_number())
     }
 
     /// Returns the error for an option that names something that the file does not have.
-    pub fn unknown_name(
+    pub fn unknown_name_error(
         &self,
         option: &str,
         requested_name: impl fmt::Display,
@@ -199,12 +200,12 @@ impl FigureFile {
     }
 
     /// Returns the error for a file without anything to draw.
-    pub fn nothing_to_draw(&self, reason: &str) -> PlotError {
+    pub fn nothing_to_draw_error(&self, reason: &str) -> PlotError {
         self.undrawable_error(format!("nothing to draw: {reason}"))
     }
 
     /// Returns the error for a file with more rows than a figure of its kind can show.
-    pub fn too_many_rows(&self, rows: usize, max_rows: usize) -> PlotError {
+    pub fn too_many_rows_error(&self, rows: usize, max_rows: usize) -> PlotError {
         let kind = self.kind.name;
         self.undrawable_error(format!(
             "a {kind} file of {rows} rows is more than a figure can show, which is {max_rows} of \
@@ -246,7 +247,7 @@ impl FigureFile {
     }
 
     /// Returns the error for a missing column that this kind of file needs.
-    pub fn missing_column(&self, column: &str, expected: &str) -> PlotError {
+    pub fn missing_column_error(&self, column: &str, expected: &str) -> PlotError {
         let kind = self.kind.name;
         self.undrawable_error(format!("a {kind} file needs the {expected} column `{column}`"))
     }
@@ -379,7 +380,7 @@ fn find_in_entries<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&
 const MAX_RUN_NAME_CHARACTERS: usize = 40;
 
 /// Returns the name of a run with its settings, as in "fig12, mass_kg = 20".
-fn run_name(provenance: &[(String, Value)]) -> Option<String> {
+fn compose_run_name(provenance: &[(String, Value)]) -> Option<String> {
     let name = find_in_entries(provenance, "name")?.as_str()?;
     let mut full_name: String = name.chars().take(MAX_RUN_NAME_CHARACTERS).collect();
     if full_name.len() < name.len() {
@@ -411,10 +412,10 @@ fn find_in_value<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 /// Returns the two columns of a boundary's bracket, which follow its two coordinates.
 pub fn bracket_columns<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
-    let find_with_word = |words: &[&str]| {
+    let find_by_words = |words: &[&str]| {
         names.iter().skip(2).copied().find(|name| name.split('_').any(|part| words.contains(&part)))
     };
-    Some((find_with_word(&["low", "lower", "min"])?, find_with_word(&["high", "upper", "max"])?))
+    Some((find_by_words(&["low", "lower", "min"])?, find_by_words(&["high", "upper", "max"])?))
 }
 
 /// Completes unit and bad direction from the column's name, for files that lost their metadata in

@@ -18,29 +18,29 @@ pub(crate) fn roomiest_position(
             (j as f64 + 0.5) / SAMPLES_PER_SIDE[1] as f64 * panel[1],
         ]
     };
-    let samples = (0..SAMPLES_PER_SIDE[0])
+    let sample_points = (0..SAMPLES_PER_SIDE[0])
         .flat_map(|i| (0..SAMPLES_PER_SIDE[1]).map(move |j| sample_point(i, j)));
-    let (inside, outside): (Vec<_>, Vec<_>) = samples.partition(|&point| is_inside(point));
+    let (inside, outside): (Vec<_>, Vec<_>) = sample_points.partition(|&point| is_inside(point));
     // The distance is in units of the text's half extent, so that a wide text gets a wide place.
     let distance = |a: [f64; 2], b: [f64; 2]| {
         let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / size[k]);
         dx.max(dy)
     };
-    let mut best: Option<(f64, [f64; 2])> = None;
+    let mut best_position: Option<(f64, [f64; 2])> = None;
     for centre in inside {
         let edge_distances = [0, 1].map(|k| 2.0 * centre[k].min(panel[k] - centre[k]) / size[k]);
         let mut clearance = edge_distances[0].min(edge_distances[1]);
         for &outside_point in &outside {
             clearance = clearance.min(distance(centre, outside_point));
-            if best.is_some_and(|(greatest, _)| clearance <= greatest) {
+            if best_position.is_some_and(|(greatest, _)| clearance <= greatest) {
                 break;
             }
         }
-        if clearance >= 1.0 && best.is_none_or(|(greatest, _)| clearance > greatest) {
-            best = Some((clearance, centre));
+        if clearance >= 1.0 && best_position.is_none_or(|(greatest, _)| clearance > greatest) {
+            best_position = Some((clearance, centre));
         }
     }
-    best.map(|(_, centre)| centre)
+    best_position.map(|(_, centre)| centre)
 }
 
 #[cfg(test)]

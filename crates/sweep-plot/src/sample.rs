@@ -100,10 +100,10 @@ impl SampleFile {
 
     /// Replaces cells of every column by what other writers or failed runs may leave: null, NaN,
     /// infinite, tiny and huge numbers. Some, all or none of a column's cells are replaced.
-    pub(crate) fn with_damage(mut self, numbers: &mut fastrand::Rng) -> Self {
+    pub(crate) fn with_damage(mut self, rng: &mut fastrand::Rng) -> Self {
         for (_, array) in &mut self.columns {
-            let replaced_share = [0.0, 0.0, 0.1, 0.5, 1.0][numbers.usize(..5)];
-            *array = replace_cells(array, replaced_share, numbers);
+            let replaced_share = [0.0, 0.0, 0.1, 0.5, 1.0][rng.usize(..5)];
+            *array = replace_cells(array, replaced_share, rng);
         }
         self
     }
@@ -114,7 +114,7 @@ impl SampleFile {
 }
 
 /// Replaces this share of a column's cells, all by the same value or each by another value.
-fn replace_cells(array: &ArrayRef, replaced_share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
+fn replace_cells(array: &ArrayRef, replaced_share: f64, rng: &mut fastrand::Rng) -> ArrayRef {
     /// Values that a figure must handle without failing.
     const DAMAGED_VALUES: [Option<f64>; 12] = [
         None,
@@ -130,10 +130,10 @@ fn replace_cells(array: &ArrayRef, replaced_share: f64, numbers: &mut fastrand::
         Some(f64::MAX),
         Some(f64::MIN),
     ];
-    let common_index = numbers.bool().then(|| numbers.usize(..DAMAGED_VALUES.len()));
+    let common_index = rng.bool().then(|| rng.usize(..DAMAGED_VALUES.len()));
     let mut next_index = || {
-        (numbers.f64() < replaced_share)
-            .then(|| common_index.unwrap_or(numbers.usize(..DAMAGED_VALUES.len())))
+        (rng.f64() < replaced_share)
+            .then(|| common_index.unwrap_or(rng.usize(..DAMAGED_VALUES.len())))
     };
     if let Some(values) = array.as_any().downcast_ref::<Float64Array>() {
         let cells =
@@ -194,7 +194,7 @@ pub(crate) struct MapSample<'a> {
     /// diverged.
     pub(crate) yaw: &'a dyn Fn(&[f64]) -> Option<[f64; 2]>,
     /// Whether the motion at a point is chaotic.
-    pub(crate) chaotic: &'a dyn Fn(&[f64]) -> bool,
+    pub(crate) is_chaotic: &'a dyn Fn(&[f64]) -> bool,
 }
 
 impl MapSample<'_> {
@@ -236,7 +236,7 @@ impl MapSample<'_> {
                 .map(move |yaw| yaw.map_or(f64::NAN, |yaw| yaw[k]))
                 .collect::<Vec<f64>>()
         };
-        let ratio: Vec<f64> = amplitudes_of_model(0)
+        let ratios: Vec<f64> = amplitudes_of_model(0)
             .iter()
             .zip(amplitudes_of_model(1))
             .map(|(nonlinear, linear)| if linear > 0.0 { nonlinear / linear } else { f64::NAN })
@@ -245,10 +245,10 @@ impl MapSample<'_> {
         for (k, (name, _)) in self.axes.iter().enumerate() {
             sample = sample.numbers(name, "", points.iter().map(|point| point[k]));
         }
-        let scaled = |factor: f64| move |value: f64| factor * value;
-        let is_known = |ratio: &f64| ratio.is_finite();
-        let channel = |ratio: &f64| is_known(ratio).then_some("body_yaw");
-        let reliable = |ratio: &f64| is_known(ratio).then_some(*ratio < self.limit);
+        let scale_by = |factor: f64| move |value: f64| factor * value;
+        let is_known = |ratios: &f64| ratios.is_finite();
+        let channel = |ratios: &f64| is_known(ratios).then_some("body_yaw");
+        let reliable = |ratios: &f64| is_known(ratios).then_some(*ratios < self.limit);
         let status = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
         let fail_time = |yaw: &Option<_>| if yaw.is_some() { f64::NAN } else { 41.5 };
         let plan = serde_json::json!({
@@ -260,20 +260,20 @@ impl MapSample<'_> {
             .numbers(
                 "nonlinear_body_pitch",
                 "rad",
-                amplitudes_of_model(0).into_iter().map(scaled(0.4)),
+                amplitudes_of_model(0).into_iter().map(scale_by(0.4)),
             )
             .numbers("linear_body_yaw", "rad", amplitudes_of_model(1))
             .numbers(
                 "linear_body_pitch",
                 "rad",
-                amplitudes_of_model(1).into_iter().map(scaled(0.5)),
+                amplitudes_of_model(1).into_iter().map(scale_by(0.5)),
             )
-            .numbers("ratio_body_yaw", "1", ratio.iter().copied())
-            .numbers("ratio_body_pitch", "1", ratio.iter().map(|ratio| 0.8 * ratio))
-            .numbers("ratio_max", "1", ratio.iter().copied())
-            .words("ratio_max_channel", ratio.iter().map(channel))
-            .flags("reliable", ratio.iter().map(reliable))
-            .flags("sensitive", points.iter().map(|point| Some((self.chaotic)(point))))
+            .numbers("ratio_body_yaw", "1", ratios.iter().copied())
+            .numbers("ratio_body_pitch", "1", ratios.iter().map(|ratios| 0.8 * ratios))
+            .numbers("ratio_max", "1", ratios.iter().copied())
+            .words("ratio_max_channel", ratios.iter().map(channel))
+            .flags("reliable", ratios.iter().map(reliable))
+            .flags("sensitive", points.iter().map(|point| Some((self.is_chaotic)(point))))
             .numbers(
                 "min_gap_nonlinear_m",
                 "m",
@@ -298,7 +298,7 @@ impl MapSample<'_> {
 
 /// Returns a map over two axes whose boundary is the line damping = 50 + 200 mass, with a failed
 /// and an undefined point.
-pub(crate) fn map() -> SampleFile {
+pub(crate) fn map_sample() -> SampleFile {
     let axis = |from: f64, step: f64, count: i32| {
         (0..count).map(|k| from + step * f64::from(k)).collect::<Vec<f64>>()
     };
@@ -316,19 +316,19 @@ pub(crate) fn map() -> SampleFile {
             }
             _ => unreachable!("two axes"),
         },
-        chaotic: &|_| false,
+        is_chaotic: &|_| false,
     }
     .sample()
 }
 
 /// Returns a boundary file with its bracket.
-pub(crate) fn boundary() -> SampleFile {
-    let mass: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
+pub(crate) fn boundary_sample() -> SampleFile {
+    let masses: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
     let damping = |offset: f64| {
-        mass.iter().map(move |mass| 50.0 + 200.0 * mass + offset).collect::<Vec<f64>>()
+        masses.iter().map(move |masses| 50.0 + 200.0 * masses + offset).collect::<Vec<f64>>()
     };
     SampleFile::default()
-        .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
+        .numbers("unbalance_mass_kg", "kg", masses.iter().copied())
         .numbers("damping_n_s_per_m", "N s/m", damping(0.0))
         .numbers("damping_low_n_s_per_m", "N s/m", damping(-2.0))
         .numbers("damping_high_n_s_per_m", "N s/m", damping(3.0))
@@ -347,8 +347,8 @@ pub(crate) fn has_figure<E: Display>(
 ) -> bool {
     let start = Instant::now();
     let result = draw();
-    let elapsed = start.elapsed();
-    assert!(elapsed < MAX_TIME, "{name}: {elapsed:?}");
+    let elapsed_time = start.elapsed();
+    assert!(elapsed_time < MAX_TIME, "{name}: {elapsed_time:?}");
     match result {
         Ok(bytes) => assert!(bytes.len() < max_bytes, "{name}: {} bytes", bytes.len()),
         Err(error) => {

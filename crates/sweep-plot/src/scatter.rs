@@ -6,7 +6,7 @@ use super::label::{self, Label};
 use super::layer::{self, ColumnGroup, DividingLimit};
 use super::read::FigureFile;
 use super::{PlotOptions, swept};
-use crate::{PlotError, Share};
+use crate::{PlotError, ShareInterval};
 use sweep_parameter::Worse;
 
 /// Maximum number of values that are kept; of a longer file some points are picked. Basis: 5 MB of
@@ -62,17 +62,17 @@ pub(crate) struct Scatter {
     /// The varying parameters in file order.
     pub(crate) parameters: Vec<DesignParameter>,
     /// The row numbers of the kept points.
-    pub(crate) points: Vec<usize>,
+    pub(crate) point_rows: Vec<usize>,
     /// The quantity at each kept point in displayed units; NaN where there is none.
-    pub(crate) quantity: Vec<f64>,
+    pub(crate) quantity_values: Vec<f64>,
     /// The side of each kept point.
     pub(crate) sides: Vec<Side>,
     /// The number of points on each of [`Side::ALL`], including points that are not kept.
-    pub(crate) counts: [u64; 4],
+    pub(crate) side_counts: [u64; 4],
 }
 
 /// Returns the side of a point by its value, or by its verdict if no limit divides the points.
-fn classify(
+fn classify_side(
     limit: Option<&DividingLimit>,
     value: f64,
     verdict: Option<&str>,
@@ -121,30 +121,34 @@ impl Scatter {
         // The verdict itself divides the points if it depends on the column alone.
         let dividing_limit = limit.as_ref().filter(|_| !column.is_verdict(&source));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
-        let mut points = Vec::new();
-        let mut quantity = Vec::new();
+        let mut point_rows = Vec::new();
+        let mut quantity_values = Vec::new();
         let mut sides = Vec::new();
-        let mut counts = [0; 4];
-        let names = [&axes[..], &[column.name(), "reliable", layer::STATUS]].concat();
+        let mut side_counts = [0; 4];
+        let names = [&axes[..], &[column.name(), "reliable", layer::STATUS_COLUMN]].concat();
         source.each_row(&names, |row| {
             let axis_count = axes.len();
             let value = row.number(axis_count) * factor;
-            let side =
-                classify(dividing_limit, value, row.word(axis_count + 1), row.word(axis_count + 2));
-            counts[side as usize] += 1;
+            let side = classify_side(
+                dividing_limit,
+                value,
+                row.word(axis_count + 1),
+                row.word(axis_count + 2),
+            );
+            side_counts[side as usize] += 1;
             if is_picked(row.index() as u64, stride) {
                 let is_missing = is_ratio && !(value > 0.0 && value.is_finite());
-                quantity.push(if is_missing { f64::NAN } else { value });
+                quantity_values.push(if is_missing { f64::NAN } else { value });
                 sides.push(side);
-                points.push(row.index());
+                point_rows.push(row.index());
                 for (column, values) in values.iter_mut().enumerate() {
                     values.push(row.number(column));
                 }
             }
             Ok(())
         })?;
-        if points.is_empty() {
-            return Err(source.nothing_to_draw("the design has no points"));
+        if point_rows.is_empty() {
+            return Err(source.nothing_to_draw_error("the design has no points"));
         }
         let varying_axes = axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
@@ -153,15 +157,15 @@ impl Scatter {
                 name: (*name).to_owned(),
                 label: Label::new(&label::name_in_words(name), facts.unit()),
                 is_log: source.is_log_axis(name) && values.iter().all(|value| *value > 0.0),
-                influence: RankInfluence::new(&values, &quantity),
+                influence: RankInfluence::new(&values, &quantity_values),
                 values,
             })
         });
         let parameters: Vec<DesignParameter> = varying_axes.collect();
         if parameters.is_empty() {
-            return Err(source.nothing_to_draw("no parameter varies from point to point"));
+            return Err(source.nothing_to_draw_error("no parameter varies from point to point"));
         }
-        let spans_decades = || crate::chart::spans_decades(quantity.iter().copied());
+        let spans_decades = || crate::chart::spans_decades(quantity_values.iter().copied());
         let is_log = is_ratio || (limit.is_none() && spans_decades());
         let label = Label::new(&label::capitalise(&quantity_label), unit);
         let short_label = Label::new(&column.short_name(), unit);
@@ -174,17 +178,17 @@ impl Scatter {
             limit,
             is_log,
             parameters,
-            points,
-            quantity,
+            point_rows,
+            quantity_values,
             sides,
-            counts,
+            side_counts,
         })
     }
 
     /// Returns the share of points on the good side among points on either side.
-    pub(crate) fn share(&self) -> Option<Share> {
-        let [good, bad, ..] = self.counts;
-        Share::wilson(good, good + bad)
+    pub(crate) fn good_share(&self) -> Option<ShareInterval> {
+        let [good, bad, ..] = self.side_counts;
+        ShareInterval::wilson(good, good + bad)
     }
 
     /// Returns the legend entry of a side.
@@ -207,38 +211,38 @@ impl Scatter {
 
     /// Returns the subtitle: name of the run, number and placement of the points, and notes.
     pub(crate) fn subtitle(&self, further_notes: &[String]) -> String {
-        let point_count: u64 = self.counts.iter().sum();
-        let mut parts = self.source.notes([match self.source.design_method() {
+        let point_count: u64 = self.side_counts.iter().sum();
+        let mut phrases = self.source.notes([match self.source.design_method() {
             Some("latin_hypercube") => format!("Latin hypercube of {point_count} points"),
             Some("sobol") => format!("Sobol sequence of {point_count} points"),
             Some("monte_carlo") => format!("{point_count} points at random"),
             _ => format!("list of {point_count} points"),
         }]);
-        if (self.points.len() as u64) < point_count {
-            parts.push(format!("{} of them picked at random", self.points.len()));
+        if (self.point_rows.len() as u64) < point_count {
+            phrases.push(format!("{} of them picked at random", self.point_rows.len()));
         }
-        parts.extend(further_notes.iter().cloned());
-        parts.join(" · ")
+        phrases.extend(further_notes.iter().cloned());
+        phrases.join(" · ")
     }
 
     /// Returns the number of points with a value of the quantity.
     pub(crate) fn count_with_value(&self) -> usize {
-        self.quantity.iter().filter(|value| value.is_finite()).count()
+        self.quantity_values.iter().filter(|value| value.is_finite()).count()
     }
 
     /// Returns the indices of about one in `stride` of the kept points.
     pub(crate) fn pick_points(&self, stride: usize) -> Vec<usize> {
         let is_picked =
-            |&k: &usize| is_picked(self.points[k] as u64 ^ DRAWN_POINTS_SALT, stride as u64);
-        (0..self.points.len()).filter(is_picked).collect()
+            |&k: &usize| is_picked(self.point_rows[k] as u64 ^ DRAWN_POINTS_SALT, stride as u64);
+        (0..self.point_rows.len()).filter(is_picked).collect()
     }
 
     /// Returns the indices of the parameters, the most influential first.
-    pub(crate) fn by_influence(&self) -> Vec<usize> {
-        let influence =
+    pub(crate) fn indices_by_influence(&self) -> Vec<usize> {
+        let parameter_influence =
             |k: usize| self.parameters[k].influence.map_or(0.0, RankInfluence::strength);
         let mut indices: Vec<usize> = (0..self.parameters.len()).collect();
-        indices.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
+        indices.sort_by(|&a, &b| parameter_influence(b).total_cmp(&parameter_influence(a)));
         indices
     }
 }

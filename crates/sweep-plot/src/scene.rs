@@ -101,7 +101,7 @@ impl Outline {
     }
 
     /// Returns the outline, shifted.
-    pub(crate) fn translated(&self, [dx, dy]: [f64; 2]) -> Self {
+    pub(crate) fn with_offset(&self, [dx, dy]: [f64; 2]) -> Self {
         let translate = |[x, y]: [f64; 2]| [x + dx, y + dy];
         let segments = self.0.iter().map(|segment| match *segment {
             PathSegment::Move(point) => PathSegment::Move(translate(point)),
@@ -113,22 +113,22 @@ impl Outline {
 
     /// Returns a disc around `centre`.
     pub(crate) fn circle(centre: [f64; 2], radius: f64) -> Self {
-        Self::around(centre, [radius; 16])
+        Self::polygon_around(centre, [radius; 16])
     }
 
     /// Returns a five-pointed star around `centre`, `radius` from centre to tip.
     pub(crate) fn star(centre: [f64; 2], radius: f64) -> Self {
         let [tip, notch] = [radius, 0.42 * radius];
-        Self::around(centre, [tip, notch, tip, notch, tip, notch, tip, notch, tip, notch])
+        Self::polygon_around(centre, [tip, notch, tip, notch, tip, notch, tip, notch, tip, notch])
     }
 
     /// Returns a polygon around the centre: corners at equal angles and these distances, clockwise
     /// from the top.
-    fn around<const N: usize>([centre_x, centre_y]: [f64; 2], distances: [f64; N]) -> Self {
+    fn polygon_around<const N: usize>([centre_x, centre_y]: [f64; 2], distances: [f64; N]) -> Self {
         let mut outline = Self::default();
-        let half = (N / 2) as f64;
+        let half_count = (N / 2) as f64;
         let corners: [[f64; 2]; N] = std::array::from_fn(|k| {
-            let (sin, cos) = (std::f64::consts::PI * k as f64 / half).sin_cos();
+            let (sin, cos) = (std::f64::consts::PI * k as f64 / half_count).sin_cos();
             [centre_x + distances[k] * sin, centre_y - distances[k] * cos]
         });
         outline.add_polygon(&corners);
@@ -147,11 +147,11 @@ pub(crate) struct Stroke {
 }
 
 impl Stroke {
-    pub(crate) fn solid(colour: Colour, width: f64) -> Self {
+    pub(crate) fn new_solid(colour: Colour, width: f64) -> Self {
         Self { colour, width, dash: Vec::new() }
     }
 
-    pub(crate) fn dashed(colour: Colour, width: f64, dash: &[f64]) -> Self {
+    pub(crate) fn new_dashed(colour: Colour, width: f64, dash: &[f64]) -> Self {
         Self { colour, width, dash: dash.to_vec() }
     }
 }
@@ -170,7 +170,7 @@ pub(crate) struct Hatch {
 impl Hatch {
     /// Returns the hatch, drawn finer if areas of `width` by `height` px could lie between its
     /// lines.
-    pub(crate) fn within(mut self, [width, height]: [f64; 2]) -> Self {
+    pub(crate) fn with_spacing_for(mut self, [width, height]: [f64; 2]) -> Self {
         // A line crosses an area at least once if the spacing is no larger than both sides.
         let finer_spacing = ((width + height) / 1.5).clamp(MIN_HATCH_SPACING, self.spacing);
         for stroke in &mut self.strokes {
@@ -226,19 +226,19 @@ impl Text {
     }
 
     /// Returns the text in bold type.
-    pub(crate) fn bold(mut self) -> Self {
+    pub(crate) fn with_bold_face(mut self) -> Self {
         self.is_bold = true;
         self
     }
 
     /// Returns the text with another anchor.
-    pub(crate) fn anchor(mut self, anchor: Anchor) -> Self {
+    pub(crate) fn with_anchor(mut self, anchor: Anchor) -> Self {
         self.anchor = anchor;
         self
     }
 
     /// Returns the text reading upwards.
-    pub(crate) fn rotated(mut self) -> Self {
+    pub(crate) fn with_rotation(mut self) -> Self {
         self.is_rotated = true;
         self
     }
@@ -282,9 +282,9 @@ pub(crate) struct Scene {
 /// The colour of letters and frames.
 pub const INK: Colour = Colour::hex(0x1b1f24);
 /// The colour of secondary text.
-pub const MUTED: Colour = Colour::hex(0x57606a);
+pub const MUTED_COLOUR: Colour = Colour::hex(0x57606a);
 /// The colour of grid lines.
-pub(crate) const FAINT: Colour = Colour::hex(0xd8dee4);
+pub(crate) const FAINT_COLOUR: Colour = Colour::hex(0xd8dee4);
 /// The colour of the background.
 pub(crate) const PAPER: Colour = Colour::hex(0xffffff);
 
@@ -292,37 +292,37 @@ impl Scene {
     /// Returns an empty scene with a white background.
     pub(crate) fn new(width: f64, height: f64, description: impl Into<String>) -> Self {
         let mut scene = Self { width, height, description: description.into(), items: Vec::new() };
-        scene.fill(Outline::rectangle(0.0, 0.0, width, height), PAPER);
+        scene.fill_outline(Outline::rectangle(0.0, 0.0, width, height), PAPER);
         scene
     }
 
-    pub(crate) fn fill(&mut self, outline: Outline, colour: Colour) {
+    pub(crate) fn fill_outline(&mut self, outline: Outline, colour: Colour) {
         self.items.push(SceneItem::Fill { outline, colour, is_crisp: false });
     }
 
     /// Fills an outline whose edges lie on whole pixels.
-    pub(crate) fn fill_crisp(&mut self, outline: Outline, colour: Colour) {
+    pub(crate) fn fill_crisply(&mut self, outline: Outline, colour: Colour) {
         self.items.push(SceneItem::Fill { outline, colour, is_crisp: true });
     }
 
     /// Draws the line of an outline.
-    pub(crate) fn line(&mut self, outline: Outline, stroke: Stroke) {
+    pub(crate) fn draw_line(&mut self, outline: Outline, stroke: Stroke) {
         self.items.push(SceneItem::Line { outline, stroke });
     }
 
-    pub(crate) fn text(&mut self, text: Text) {
+    pub(crate) fn draw_text(&mut self, text: Text) {
         self.items.push(SceneItem::Text(text));
     }
 
     /// Draws the items of `draw` within `outline` alone.
-    pub(crate) fn clipped(&mut self, outline: Outline, draw: impl FnOnce(&mut Self)) {
+    pub(crate) fn draw_clipped(&mut self, outline: Outline, draw: impl FnOnce(&mut Self)) {
         self.items.push(SceneItem::Clip(outline));
         draw(self);
         self.items.push(SceneItem::Unclip);
     }
 
     /// Fills `outline` with slanted lines.
-    pub(crate) fn hatch(&mut self, outline: Outline, hatch: &Hatch) {
+    pub(crate) fn fill_with_hatch(&mut self, outline: Outline, hatch: &Hatch) {
         let spacing = hatch.spacing;
         let extent = |k: usize| {
             extremes(outline.0.iter().filter_map(|segment| match *segment {
@@ -348,9 +348,9 @@ impl Scene {
             lines.add_line(&[[x, start_y], [x - height, end_y]]);
             x += spacing;
         }
-        self.clipped(outline, |scene| {
+        self.draw_clipped(outline, |scene| {
             for stroke in &hatch.strokes {
-                scene.line(lines.clone(), stroke.clone());
+                scene.draw_line(lines.clone(), stroke.clone());
             }
         });
     }

@@ -2,7 +2,7 @@
 
 /// A share of points with its 95 % confidence interval, which holds for independent random points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Share {
+pub struct ShareInterval {
     /// The share, from 0 to 1.
     pub fraction: f64,
     /// The lower end of the interval.
@@ -11,7 +11,7 @@ pub struct Share {
     pub high: f64,
 }
 
-impl Share {
+impl ShareInterval {
     /// Returns the share `count` of `total` with Wilson's score interval; `None` for no points.
     ///
     /// E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn the_interval_is_wilsons() {
         let percent = |count, all| {
-            let share = Share::wilson(count, all).unwrap();
+            let share = ShareInterval::wilson(count, all).unwrap();
             [share.fraction, share.low, share.high]
                 .map(|fraction| format!("{:.1}", 100.0 * fraction))
         };
@@ -52,6 +52,6 @@ mod tests {
         assert_eq!(percent(8, 10), ["80.0", "49.0", "94.3"]);
         assert_eq!(percent(100, 100), ["100.0", "96.3", "100.0"]);
         assert_eq!(percent(0, 100), ["0.0", "0.0", "3.7"]);
-        assert_eq!(Share::wilson(0, 0), None);
+        assert_eq!(ShareInterval::wilson(0, 0), None);
     }
 }

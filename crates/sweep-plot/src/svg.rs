@@ -9,23 +9,29 @@ use super::scene::{Anchor, Colour, Outline, PathSegment, Scene, SceneItem, Strok
 const FONT_FAMILIES: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
 /// Writes a scene as an SVG document. The same scene gives the same bytes.
-pub(crate) fn write(scene: &Scene) -> String {
+pub(crate) fn write_svg(scene: &Scene) -> String {
     let mut svg = String::new();
     let width = format_pixels(scene.width);
     let height = format_pixels(scene.height);
-    let size = format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
-    let role = format!(r#"role="img" font-family="{FONT_FAMILIES}""#);
+    let size_attributes =
+        format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
+    let role_attributes = format!(r#"role="img" font-family="{FONT_FAMILIES}""#);
     // Writing to a string cannot fail, so that the results below are ignored.
-    let _ = writeln!(svg, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
+    let _ = writeln!(
+        svg,
+        r#"<svg xmlns="http://www.w3.org/2000/svg" {size_attributes} {role_attributes}>"#
+    );
     let _ = writeln!(svg, "<title>{}</title>", escape(&scene.description));
-    let clips = write_clips(&mut svg, scene);
+    let clip_ids = write_clips(&mut svg, scene);
     for item in &scene.items {
         match item {
             SceneItem::Fill { outline, colour, is_crisp } => {
-                let rendering = if *is_crisp { r#" shape-rendering="crispEdges""# } else { "" };
+                let rendering_attribute =
+                    if *is_crisp { r#" shape-rendering="crispEdges""# } else { "" };
                 let data = path_data(outline);
-                let fill = paint_attributes("fill", *colour);
-                let _ = writeln!(svg, r#"<path d="{data}"{fill}{rendering}/>"#);
+                let fill_attributes = paint_attributes("fill", *colour);
+                let _ =
+                    writeln!(svg, r#"<path d="{data}"{fill_attributes}{rendering_attribute}/>"#);
             }
             SceneItem::Line { outline, stroke } => {
                 let data = path_data(outline);
@@ -34,7 +40,8 @@ pub(crate) fn write(scene: &Scene) -> String {
             }
             SceneItem::Text(text) => write_text(&mut svg, text),
             SceneItem::Clip(outline) => {
-                let _ = writeln!(svg, r##"<g clip-path="url(#c{})">"##, clips[&path_data(outline)]);
+                let _ =
+                    writeln!(svg, r##"<g clip-path="url(#c{})">"##, clip_ids[&path_data(outline)]);
             }
             SceneItem::Unclip => svg.push_str("</g>\n"),
         }
@@ -44,21 +51,21 @@ pub(crate) fn write(scene: &Scene) -> String {
 }
 
 /// Writes the definition of each clip outline once. Returns their numbers by outline.
-fn write_clips(out: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
-    let mut clips = BTreeMap::new();
+fn write_clips(svg: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
+    let mut clip_ids = BTreeMap::new();
     for item in &scene.items {
         let SceneItem::Clip(outline) = item else { continue };
         let data = path_data(outline);
-        if !clips.contains_key(&data) {
-            let id = clips.len();
-            let _ = writeln!(out, r#"<clipPath id="c{id}"><path d="{data}"/></clipPath>"#);
-            clips.insert(data, id);
+        if !clip_ids.contains_key(&data) {
+            let clip_id = clip_ids.len();
+            let _ = writeln!(svg, r#"<clipPath id="c{clip_id}"><path d="{data}"/></clipPath>"#);
+            clip_ids.insert(data, clip_id);
         }
     }
-    clips
+    clip_ids
 }
 
-fn write_text(out: &mut String, text: &Text) {
+fn write_text(svg: &mut String, text: &Text) {
     let x = format_pixels(text.position[0]);
     let y = format_pixels(text.position[1]);
     let position = if text.is_rotated {
@@ -66,22 +73,23 @@ fn write_text(out: &mut String, text: &Text) {
     } else {
         format!(r#"x="{x}" y="{y}""#)
     };
-    let anchor = match text.anchor {
+    let anchor_attribute = match text.anchor {
         Anchor::Start => "",
         Anchor::Middle => r#" text-anchor="middle""#,
         Anchor::End => r#" text-anchor="end""#,
     };
-    let weight = if text.is_bold { r#" font-weight="bold""# } else { "" };
-    let size = format_pixels(text.size);
+    let weight_attribute = if text.is_bold { r#" font-weight="bold""# } else { "" };
+    let font_size = format_pixels(text.size);
     let halo = text.halo.map_or(String::new(), |colour| {
         let stroke = paint_attributes("stroke", colour);
         let width = format_pixels(halo_width(text.size));
         format!(r#"{stroke} stroke-width="{width}" stroke-linejoin="round" paint-order="stroke""#)
     });
     let fill = paint_attributes("fill", text.colour);
-    let escaped = escape(&text.text);
-    let style = format!(r#"font-size="{size}"{weight}{anchor}{fill}{halo}"#);
-    let _ = writeln!(out, "<text {position} {style}>{escaped}</text>");
+    let escaped_text = escape(&text.text);
+    let text_attributes =
+        format!(r#"font-size="{font_size}"{weight_attribute}{anchor_attribute}{fill}{halo}"#);
+    let _ = writeln!(svg, "<text {position} {text_attributes}>{escaped_text}</text>");
 }
 
 /// Greatest coordinate that is written, px; positions beyond are moved there. Basis: far outside of
@@ -118,34 +126,34 @@ fn path_data(outline: &Outline) -> String {
     let mut data = String::new();
     // Positions are rounded to hundredths of a pixel before differences are taken, so that rounding
     // does not add up.
-    let mut current = [0_i64; 2];
-    let mut start = [0_i64; 2];
+    let mut current_point = [0_i64; 2];
+    let mut start_point = [0_i64; 2];
     for segment in &outline.0 {
         match *segment {
             PathSegment::Move(point) => {
-                current = to_hundredths(point);
-                start = current;
+                current_point = to_hundredths(point);
+                start_point = current_point;
                 let _ = write!(
                     data,
                     "M{} {}",
-                    format_hundredths(current[0]),
-                    format_hundredths(current[1])
+                    format_hundredths(current_point[0]),
+                    format_hundredths(current_point[1])
                 );
             }
             PathSegment::Line(point) => {
-                let next = to_hundredths(point);
-                let [dx, dy] = [next[0] - current[0], next[1] - current[1]];
+                let next_point = to_hundredths(point);
+                let [dx, dy] = [next_point[0] - current_point[0], next_point[1] - current_point[1]];
                 data += &match (format_hundredths(dx), format_hundredths(dy)) {
                     (dx, _) if dy == 0 => format!("h{dx}"),
                     (_, dy) if dx == 0 => format!("v{dy}"),
                     (dx, dy) if dy.starts_with('-') => format!("l{dx}{dy}"),
                     (dx, dy) => format!("l{dx} {dy}"),
                 };
-                current = next;
+                current_point = next_point;
             }
             PathSegment::Close => {
                 data.push('z');
-                current = start;
+                current_point = start_point;
             }
         }
     }
@@ -175,19 +183,19 @@ pub(crate) fn format_pixels(value: f64) -> String {
 
 /// Escapes text for XML character data.
 pub fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
+    let mut escaped_text = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
+            '&' => escaped_text.push_str("&amp;"),
+            '<' => escaped_text.push_str("&lt;"),
+            '>' => escaped_text.push_str("&gt;"),
+            '"' => escaped_text.push_str("&quot;"),
             // XML 1.0 allows no control characters, not even escaped ones.
-            letter if letter.is_control() => escaped.push(' '),
-            letter => escaped.push(letter),
+            letter if letter.is_control() => escaped_text.push(' '),
+            letter => escaped_text.push(letter),
         }
     }
-    escaped
+    escaped_text
 }
 
 #[cfg(test)]

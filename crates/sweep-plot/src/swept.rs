@@ -57,7 +57,7 @@ impl SweptAxis {
 struct AxisCollector {
     seen_bits: BTreeSet<u64>,
     last_value: Option<f64>,
-    range: Option<[f64; 2]>,
+    value_range: Option<[f64; 2]>,
     /// Whether there are more values than are kept.
     has_overflowed: bool,
 }
@@ -68,8 +68,8 @@ impl AxisCollector {
         if self.last_value.replace(value) == Some(value) {
             return;
         }
-        let [low, high] = self.range.unwrap_or([value; 2]);
-        self.range = Some([low.min(value), high.max(value)]);
+        let [low, high] = self.value_range.unwrap_or([value; 2]);
+        self.value_range = Some([low.min(value), high.max(value)]);
         // Adding 0 gives both zeros the same bits.
         let value_bits = (value + 0.0).to_bits();
         if self.seen_bits.len() < MAX_AXIS_VALUES {
@@ -83,9 +83,9 @@ impl AxisCollector {
         let mut values: Vec<f64> = self.seen_bits.into_iter().map(f64::from_bits).collect();
         values.sort_by(f64::total_cmp);
         // The first values decide on the spacing of an axis with more than are kept.
-        let is_log = is_log_spaced(&values) && self.range.is_some_and(|[low, _]| low > 0.0);
+        let is_log = is_log_spaced(&values) && self.value_range.is_some_and(|[low, _]| low > 0.0);
         if self.has_overflowed {
-            values = self.range.map_or_else(Vec::new, Vec::from);
+            values = self.value_range.map_or_else(Vec::new, Vec::from);
         }
         SweptAxis {
             name: column.name.clone(),
@@ -102,9 +102,10 @@ impl AxisCollector {
 /// and the results, or the speeds of each point.
 pub fn axis_columns(source: &FigureFile) -> Vec<&ColumnFacts> {
     let is_amplitude = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let is_result = |name: &str| is_amplitude(name) || source.kind.columns.contains(&name);
-    let before_results = source.columns.iter().take_while(|column| !is_result(&column.name));
-    before_results.filter(|column| column.is_number() && column.name != "point").collect()
+    let is_result = |name: &str| is_amplitude(name) || source.kind.required_columns.contains(&name);
+    let columns_before_results =
+        source.columns.iter().take_while(|column| !is_result(&column.name));
+    columns_before_results.filter(|column| column.is_number() && column.name != "point").collect()
 }
 
 /// Returns whether the rows of a map file are a whole grid over two axes or more, or a curve over
@@ -113,16 +114,16 @@ pub fn axis_columns(source: &FigureFile) -> Vec<&ColumnFacts> {
 /// # Errors
 /// Returns the errors of [`axes`], except for rows that do not lie on a grid, which give `false`.
 pub fn is_whole_grid(source: &FigureFile) -> Result<bool> {
-    let axes = match axes(source) {
+    let axes = match read_axes(source) {
         Ok(axes) => axes,
         Err(PlotError::NotAGrid { .. }) => return Ok(false),
         Err(error) => return Err(error),
     };
     let varying_axes: Vec<&SweptAxis> = axes.iter().filter(|axis| axis.values.len() > 1).collect();
     let mut lengths = axes.iter().map(|axis| axis.values.len());
-    let size = lengths.try_fold(1_usize, usize::checked_mul);
+    let point_count = lengths.try_fold(1_usize, usize::checked_mul);
     Ok(varying_axes.len() < 2
-        || size == Some(source.rows) && axes.iter().all(|axis| axis.is_complete))
+        || point_count == Some(source.rows) && axes.iter().all(|axis| axis.is_complete))
 }
 
 /// Finds the axes of a map file, in file order.
@@ -131,14 +132,15 @@ pub fn is_whole_grid(source: &FigureFile) -> Result<bool> {
 /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::Undrawable`] without rows or axes;
 /// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
 /// grid.
-pub fn axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {
+pub fn read_axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {
     if source.rows == 0 {
-        return Err(source.nothing_to_draw("the map has no rows"));
+        return Err(source.nothing_to_draw_error("the map has no rows"));
     }
-    let not_a_grid = |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
+    let not_a_grid_error =
+        |reason: String| PlotError::NotAGrid { path: source.path.clone(), reason };
     let axis_columns_found = axis_columns(source);
     if axis_columns_found.is_empty() {
-        return Err(source.nothing_to_draw("the map has no axis"));
+        return Err(source.nothing_to_draw_error("the map has no axis"));
     }
     let names: Vec<&str> = axis_columns_found.iter().map(|column| column.name.as_str()).collect();
     let mut collectors: Vec<AxisCollector> =
@@ -147,22 +149,26 @@ pub fn axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {
         for (column, (name, collectors)) in names.iter().zip(&mut collectors).enumerate() {
             let value = row.number(column);
             if !value.is_finite() {
-                return Err(not_a_grid(format!("axis `{name}` has a row without a value")));
+                return Err(not_a_grid_error(format!("axis `{name}` has a row without a value")));
             }
             collectors.add(value);
         }
         // The check is repeated at each row, because the values of scattered rows would fill the
         // memory.
         let mut value_counts = collectors.iter().map(|axis| axis.seen_bits.len());
-        let size = value_counts.try_fold(1_usize, usize::checked_mul);
-        if size.is_none_or(|size| size > source.rows.saturating_add(MAX_MISSING_POINTS)) {
-            return Err(not_a_grid("its rows are scattered over the axes' values".to_owned()));
+        let point_count = value_counts.try_fold(1_usize, usize::checked_mul);
+        if point_count
+            .is_none_or(|point_count| point_count > source.rows.saturating_add(MAX_MISSING_POINTS))
+        {
+            return Err(not_a_grid_error(
+                "its rows are scattered over the axes' values".to_owned(),
+            ));
         }
         Ok(())
     })?;
     // The metadata may claim rows that the file does not have.
     if collectors.iter().any(|axis| axis.seen_bits.is_empty()) {
-        return Err(source.nothing_to_draw("the map has no rows"));
+        return Err(source.nothing_to_draw_error("the map has no rows"));
     }
     Ok(axis_columns_found
         .iter()

@@ -14,7 +14,7 @@ pub const MAX_VALUES: usize = 1_400_000;
 
 /// The values of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Values {
+pub enum ColumnValues {
     /// Numbers of any type; null is NaN.
     Numbers(Vec<f64>),
     /// Words in dictionary encoding.
@@ -39,13 +39,13 @@ pub const SEVERAL_WORDS: u8 = u8::MAX - 1;
 
 impl Words {
     /// Returns a column of rows without a word.
-    pub fn none(rows: usize) -> Self {
+    pub fn without_words(rows: usize) -> Self {
         Self { codes: vec![NO_WORD; rows], ..Self::default() }
     }
 
     /// Returns the code of a word and adds new words to the dictionary. Words beyond the first 254
     /// have no code; the program writes no such file.
-    pub fn code(&mut self, word: Option<&str>) -> u8 {
+    pub fn code_for(&mut self, word: Option<&str>) -> u8 {
         let Some(word) = word else { return NO_WORD };
         if self.names.get(usize::from(self.last_code)).is_some_and(|name| name == word) {
             return self.last_code;
@@ -88,7 +88,7 @@ pub struct FigureColumn {
     /// The column's facts in the file's schema.
     pub facts: ColumnFacts,
     /// The value of each row.
-    pub values: Values,
+    pub values: ColumnValues,
 }
 
 impl FigureColumn {
@@ -99,13 +99,13 @@ impl FigureColumn {
 
     /// Returns the values if they are numbers.
     pub fn numbers(&self) -> Option<&[f64]> {
-        let Values::Numbers(values) = &self.values else { return None };
+        let ColumnValues::Numbers(values) = &self.values else { return None };
         Some(values)
     }
 
     /// Returns the values if they are words.
     pub fn words(&self) -> Option<&Words> {
-        let Values::Words(words) = &self.values else { return None };
+        let ColumnValues::Words(words) = &self.values else { return None };
         Some(words)
     }
 }
@@ -129,32 +129,32 @@ impl FigureTable {
     /// Returns the errors of [`FigureFile::each_row`]; [`crate::PlotError::Undrawable`] for other
     /// files with more values than a figure keeps.
     pub fn read(source: FigureFile) -> Result<Self> {
-        let max_rows = MAX_VALUES / source.numeric().count().max(1);
+        let max_rows = MAX_VALUES / source.number_columns().count().max(1);
         if source.rows > max_rows {
             if source.kind == FigureKind::TRACE {
                 return Self::read_decimated(source, max_rows / 2);
             }
-            return Err(source.too_many_rows(source.rows, max_rows));
+            return Err(source.too_many_rows_error(source.rows, max_rows));
         }
         let column_names: Vec<&str> =
             source.columns.iter().map(|column| column.name.as_str()).collect();
         let empty_values = |column: &ColumnFacts| match column.is_number() {
-            true => Values::Numbers(Vec::with_capacity(source.rows)),
-            false => Values::Words(Words::default()),
+            true => ColumnValues::Numbers(Vec::with_capacity(source.rows)),
+            false => ColumnValues::Words(Words::default()),
         };
-        let mut values: Vec<Values> = source.columns.iter().map(empty_values).collect();
+        let mut values: Vec<ColumnValues> = source.columns.iter().map(empty_values).collect();
         let mut rows = 0;
         source.each_row(&column_names, |row| {
             rows += 1;
             // The metadata may claim fewer rows than the file has.
             if rows > max_rows {
-                return Err(source.too_many_rows(rows, max_rows));
+                return Err(source.too_many_rows_error(rows, max_rows));
             }
             for (column, values) in values.iter_mut().enumerate() {
                 match values {
-                    Values::Numbers(numbers) => numbers.push(row.number(column)),
-                    Values::Words(words) => {
-                        let code = words.code(row.word(column));
+                    ColumnValues::Numbers(numbers) => numbers.push(row.number(column)),
+                    ColumnValues::Words(words) => {
+                        let code = words.code_for(row.word(column));
                         words.codes.push(code);
                     }
                 }
@@ -175,7 +175,8 @@ impl FigureTable {
     /// Returns the errors of [`FigureFile::each_row`].
     pub fn read_decimated(source: FigureFile, count: usize) -> Result<Self> {
         let buckets = Buckets::new(source.rows, count);
-        let column_names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
+        let column_names: Vec<&str> =
+            source.number_columns().map(|column| column.name.as_str()).collect();
         let rule =
             |name: &str| if name == "time_s" { KeptValues::Instants } else { KeptValues::Extremes };
         let mut decimators: Vec<Decimator> =
@@ -186,8 +187,8 @@ impl FigureTable {
             Ok(())
         })?;
         let columns_of_numbers =
-            decimators.into_iter().map(|decimator| Values::Numbers(decimator.finish()));
-        let columns = source.numeric().cloned().zip(columns_of_numbers);
+            decimators.into_iter().map(|decimator| ColumnValues::Numbers(decimator.finish()));
+        let columns = source.number_columns().cloned().zip(columns_of_numbers);
         let columns: Vec<FigureColumn> =
             columns.map(|(facts, values)| FigureColumn { facts, values }).collect();
         let rows = columns.first().and_then(FigureColumn::numbers).map_or(0, <[f64]>::len);
@@ -213,7 +214,7 @@ impl FigureTable {
     /// [`crate::PlotError::Undrawable`].
     pub fn numbers(&self, name: &str) -> Result<&[f64]> {
         let numbers = self.column(name).and_then(FigureColumn::numbers);
-        numbers.ok_or_else(|| self.source.missing_column(name, "numeric"))
+        numbers.ok_or_else(|| self.source.missing_column_error(name, "numeric"))
     }
 
     /// Returns the columns of numbers whose name starts with `prefix`, with the rest of the name.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::sample::{MapSample, SampleFile, boundary, map};
+use super::sample::{MapSample, SampleFile, boundary_sample, map_sample};
 use super::*;
 
 pub(super) fn draw(
@@ -61,7 +61,7 @@ fn map_of_three_axes() -> SampleFile {
         ],
         limit: 2.0,
         yaw: &|point| Some([0.02 * point[0] * point[2] / point[1], 0.01]),
-        chaotic: &|_| false,
+        is_chaotic: &|_| false,
     }
     .sample()
 }
@@ -71,7 +71,7 @@ pub(super) fn map_of_one_axis() -> SampleFile {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,
         yaw: &|point| (point[0] > 70.0).then(|| [2.0 / point[0], 0.01]),
-        chaotic: &|_| false,
+        is_chaotic: &|_| false,
     }
     .sample()
 }
@@ -79,9 +79,11 @@ pub(super) fn map_of_one_axis() -> SampleFile {
 #[test]
 fn columns_have_units_words_and_provenance() {
     let folder = tempfile::tempdir().unwrap();
-    let table =
-        FigureTable::open(&map().write(folder.path(), "map.parquet"), read::ModelKinds::default())
-            .unwrap();
+    let table = FigureTable::open(
+        &map_sample().write(folder.path(), "map.parquet"),
+        read::ModelKinds::default(),
+    )
+    .unwrap();
     assert_eq!((table.source.kind, table.rows), (FigureKind::MAP, 90));
     let column = |name: &str| table.column(name).unwrap();
     assert_eq!(
@@ -116,19 +118,19 @@ fn columns_have_units_words_and_provenance() {
 
 #[test]
 fn the_same_file_gives_the_same_bytes() {
-    for sample in [map, map_of_three_axes, map_of_one_axis, boundary] {
+    for sample in [map_sample, map_of_three_axes, map_of_one_axis, boundary_sample] {
         for output in ["a.svg", "a.html"] {
             let figures = [0, 1].map(|_| draw(sample(), &PlotOptions::default(), output).unwrap());
             assert!(figures[0] == figures[1], "{output}");
         }
     }
-    let figures = [0, 1].map(|_| draw(map(), &PlotOptions::default(), "a.png").unwrap());
+    let figures = [0, 1].map(|_| draw(map_sample(), &PlotOptions::default(), "a.png").unwrap());
     assert!(figures[0] == figures[1], "a.png");
 }
 
 #[test]
 fn a_map_labels_axes_sides_boundary_and_failures() {
-    let figure = draw_svg(map(), &PlotOptions::default());
+    let figure = draw_svg(map_sample(), &PlotOptions::default());
     for phrase in [
         ">Unbalance mass (kg)<",
         ">Damping (N s/m)<",
@@ -145,7 +147,7 @@ fn a_map_labels_axes_sides_boundary_and_failures() {
 
 #[test]
 fn the_boundary_of_a_map_follows_the_limit() {
-    let data = draw_page_data(map(), &PlotOptions::default());
+    let data = draw_page_data(map_sample(), &PlotOptions::default());
     let line = &data["layers"][0]["lines"][0];
     let points: Vec<f64> = line
         .as_array()
@@ -169,7 +171,7 @@ pub(crate) fn options_for_column(column: &str) -> PlotOptions {
 
 #[test]
 fn every_column_can_be_drawn() {
-    let draw_column = |column| draw_svg(map(), &options_for_column(column));
+    let draw_column = |column| draw_svg(map_sample(), &options_for_column(column));
     for (figure, phrase) in [
         (draw_column("ratio_body_pitch"), ">Ratio of amplitudes: body pitch<"),
         (draw_column("nonlinear_body_yaw"), ">amplitude, nonlinear model (mrad)<"),
@@ -265,7 +267,7 @@ fn a_boundary_that_is_not_drawn_has_no_legend() {
             ],
             limit,
             yaw: &|point| Some([0.02 + 0.05 * point[0], 0.01]),
-            chaotic: &|_| false,
+            is_chaotic: &|_| false,
         };
         draw_svg(sample.sample(), &PlotOptions::default())
     };
@@ -278,7 +280,7 @@ fn a_boundary_that_is_not_drawn_has_no_legend() {
 #[test]
 fn a_boundary_is_drawn_with_its_bracket() {
     assert!(
-        draw_svg(boundary(), &PlotOptions::default())
+        draw_svg(boundary_sample(), &PlotOptions::default())
             .contains(">boundary: ratio 2, bracket shaded<")
     );
 }
@@ -288,7 +290,10 @@ fn a_boundary_by_a_condition_has_the_words_of_the_user() {
     let figure = |quantity: &str, limit: f64| {
         let settings =
             format!(r#"{{"quantity": "{quantity}", "limit": {limit}, "worse": "less"}}"#);
-        draw_svg(boundary().with_metadata("sweep.boundary", &settings), &PlotOptions::default())
+        draw_svg(
+            boundary_sample().with_metadata("sweep.boundary", &settings),
+            &PlotOptions::default(),
+        )
     };
     let by_condition = figure("margin(ratio_max / 2 != 1 and nonlinear_tub_yaw != 0)", 0.0);
     for text in [">Where ratio_max", "nonlinear_tub_yaw != 0<", ">boundary: limit of ratio_max"] {
@@ -306,14 +311,14 @@ fn a_boundary_by_a_condition_has_the_words_of_the_user() {
 
 #[test]
 fn a_png_is_twice_the_size_of_its_figure() {
-    let image = draw(map(), &PlotOptions::default(), "a.png").unwrap();
+    let image = draw(map_sample(), &PlotOptions::default(), "a.png").unwrap();
     assert_eq!(&image[..8], b"\x89PNG\r\n\x1a\n");
     assert_eq!(u32::from_be_bytes(image[16..20].try_into().unwrap()), 1760);
 }
 
 #[test]
 fn a_page_is_self_contained() {
-    let hostile_sample = || map().with_metadata("note", "</script><img src=x> {{data}}");
+    let hostile_sample = || map_sample().with_metadata("note", "</script><img src=x> {{data}}");
     let page =
         String::from_utf8(draw(hostile_sample(), &PlotOptions::default(), "a.html").unwrap())
             .unwrap();
@@ -329,11 +334,11 @@ fn a_page_is_self_contained() {
 
 #[test]
 fn a_figure_as_pdf_has_the_pages_size_and_its_title() {
-    let document = draw(map(), &PlotOptions::default(), "figure.pdf").unwrap();
+    let document = draw(map_sample(), &PlotOptions::default(), "figure.pdf").unwrap();
     assert!(document.starts_with(b"%PDF-1.7\n"));
     assert!(document.ends_with(b"%%EOF\n"));
     let text = String::from_utf8_lossy(&document);
-    let figure = draw_svg(map(), &PlotOptions::default());
+    let figure = draw_svg(map_sample(), &PlotOptions::default());
     let width = figure.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
     let points = 0.75 * width.parse::<f64>().unwrap();
     assert!(text.contains(&format!("/MediaBox [0 0 {points} ")), "{width}");
@@ -356,19 +361,22 @@ fn errors_name_their_cause_and_nothing_is_written() {
         .numbers("ratio_max", "1", [1.0, 1.0])
         .words("status", [Some("ok"), Some("ok")]);
     for (result, phrase) in [
-        (draw(map(), &default_options, "a.eps"), ".svg, .pdf, .png or .html"),
-        (draw(map(), &default_options, "input.parquet/a.svg"), "a part of that path is a file"),
+        (draw(map_sample(), &default_options, "a.eps"), ".svg, .pdf, .png or .html"),
         (
-            draw(map(), &options_for_column("ratio_yow"), "a.svg"),
+            draw(map_sample(), &default_options, "input.parquet/a.svg"),
+            "a part of that path is a file",
+        ),
+        (
+            draw(map_sample(), &options_for_column("ratio_yow"), "a.svg"),
             "it has ratio_max, ratio_body_yaw",
         ),
         (
-            draw(map(), &options_for_column("ratio_yow"), "a.html"),
+            draw(map_sample(), &options_for_column("ratio_yow"), "a.html"),
             "it has ratio_max, ratio_body_yaw",
         ),
-        (draw(map(), &unknown_axis, "a.svg"), "it has none"),
-        (draw(map(), &traces, "a.svg"), "maps drawn as .html"),
-        (draw(map(), &traces, "a.html"), "no trace files"),
+        (draw(map_sample(), &unknown_axis, "a.svg"), "it has none"),
+        (draw(map_sample(), &traces, "a.svg"), "maps drawn as .html"),
+        (draw(map_sample(), &traces, "a.html"), "no trace files"),
         (draw(empty_map(), &default_options, "a.svg"), "the map has no rows"),
         (draw(repeated_point, &default_options, "a.svg"), "rows 0 and 1 are the same point"),
         (

@@ -43,8 +43,13 @@ pub fn plan_differences(files: [(&FigureFile, &NamedPoint); 2], sections: &[&str
         let pointer = format!("/{}", section.replace('.', "/"));
         let (first_key, _) = section.split_once('.').unwrap_or((section, ""));
         if [first, second].iter().all(|plan| plan.get(first_key).is_some()) {
-            let sides = [first, second].map(|plan| plan.pointer(&pointer));
-            collect_differences(sides, files.map(|(_, point)| point), path, &mut differences);
+            let values_by_file = [first, second].map(|plan| plan.pointer(&pointer));
+            collect_differences(
+                values_by_file,
+                files.map(|(_, point)| point),
+                path,
+                &mut differences,
+            );
         }
     }
     differences
@@ -74,20 +79,20 @@ pub fn check_agreement(
 
 /// Joins the first `max_count` texts, and appends the number of further ones.
 pub fn join_first(texts: &[String], max_count: usize) -> String {
-    let omitted = texts.len().saturating_sub(max_count);
-    let first = texts[..texts.len() - omitted].join(", ");
-    if omitted > 0 { format!("{first} and {omitted} more") } else { first }
+    let omitted_count = texts.len().saturating_sub(max_count);
+    let first_texts = texts[..texts.len() - omitted_count].join(", ");
+    if omitted_count > 0 { format!("{first_texts} and {omitted_count} more") } else { first_texts }
 }
 
 /// Collects the differences of two values of a plan from this path on.
 fn collect_differences<'a>(
-    sides: [Option<&'a Value>; 2],
+    values_by_file: [Option<&'a Value>; 2],
     points: [&NamedPoint; 2],
     mut path: Vec<Step<'a>>,
     differences: &mut Vec<String>,
 ) {
     let have_same_length = |first: &[Value], second: &[Value]| first.len() == second.len();
-    visit_leaves(sides, have_same_length, &mut path, &mut |path, values| {
+    visit_leaves(values_by_file, have_same_length, &mut path, &mut |path, values| {
         let [first, second] = [0, 1].map(|side| value_at_point(values[side], points[side], path));
         if first != second && !is_parameter_of_point([&first, &second], points, path) {
             let [first, second] = [first, second].map(|value| match value {
@@ -131,11 +136,11 @@ fn is_set_by(parameter: &str, path: &[Step<'_>]) -> bool {
 /// Whether a value is that of a parameter of the point, although its path has another name.
 fn is_parameter_of_point(values: [&Value; 2], points: [&NamedPoint; 2], path: &[Step<'_>]) -> bool {
     points.into_iter().flatten().any(|(name, value)| {
-        let mut words_of_name = name.split('_').filter(|token| token.len() > 1);
+        let mut words_in_name = name.split('_').filter(|token| token.len() > 1);
         let path_text = dotted_path(path);
         !is_set_by(name, path)
             && values.iter().any(|plan_value| plan_value.as_f64() == Some(*value))
-            && words_of_name.next().is_some_and(|first| path_text.contains(first))
+            && words_in_name.next().is_some_and(|first| path_text.contains(first))
     })
 }
 
@@ -150,15 +155,15 @@ mod tests {
         second: (&Value, &NamedPoint),
     ) -> Vec<String> {
         let mut differences = Vec::new();
-        let sides = [Some(first.0), Some(second.0)];
+        let values_by_file = [Some(first.0), Some(second.0)];
         let points = [first.1, second.1];
-        collect_differences(sides, points, vec![Step::Name("machine")], &mut differences);
+        collect_differences(values_by_file, points, vec![Step::Name("machine")], &mut differences);
         differences
     }
 
-    fn machine(damping: f64, mass: f64, inertia: f64) -> Value {
+    fn machine_plan(damping: f64, mass: f64, point_with_inertia: f64) -> Value {
         json!({
-            "rotor": { "mass_kg": mass, "inertia_kg_m2": [1.0, inertia, 1.5] },
+            "rotor": { "mass_kg": mass, "inertia_kg_m2": [1.0, point_with_inertia, 1.5] },
             "dampers": [{ "damping_n_s_per_m": damping }, { "damping_n_s_per_m": damping }],
         })
     }
@@ -168,38 +173,49 @@ mod tests {
         let point_from = |list: &[(&str, f64)]| -> NamedPoint {
             list.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect()
         };
-        let base = machine(140.0, 24.0, 1.6);
+        let base_plan = machine_plan(140.0, 24.0, 1.6);
         let no_values = point_from(&[]);
-        assert!(plan_differences_at((&base, &no_values), (&base, &no_values)).is_empty());
-        let light = machine(140.0, 20.0, 1.6);
-        let differences = plan_differences_at((&base, &no_values), (&light, &no_values));
+        assert!(plan_differences_at((&base_plan, &no_values), (&base_plan, &no_values)).is_empty());
+        let light_plan = machine_plan(140.0, 20.0, 1.6);
+        let differences = plan_differences_at((&base_plan, &no_values), (&light_plan, &no_values));
         assert_eq!(differences, ["machine.rotor.mass_kg 24.0 and 20.0"]);
         // The first file is a map at a point; the second a trace, whose plan has the point's
         // values.
         let point = point_from(&[("damping_n_s_per_m", 100.0), ("rotor_mass_kg", 20.0)]);
-        let run = machine(100.0, 20.0, 1.6);
-        assert!(plan_differences_at((&base, &point), (&run, &no_values)).is_empty());
-        assert!(plan_differences_at((&base, &point), (&base, &point)).is_empty());
+        let run_plan = machine_plan(100.0, 20.0, 1.6);
+        assert!(plan_differences_at((&base_plan, &point), (&run_plan, &no_values)).is_empty());
+        assert!(plan_differences_at((&base_plan, &point), (&base_plan, &point)).is_empty());
         assert_eq!(
-            plan_differences_at((&base, &point), (&base, &no_values)),
+            plan_differences_at((&base_plan, &point), (&base_plan, &no_values)),
             [
                 "machine.dampers.damping_n_s_per_m 100.0 and 140.0",
                 "machine.rotor.mass_kg 20.0 and 24.0"
             ]
         );
         let one_damper = point_from(&[("damper_2_damping_n_s_per_m", 100.0)]);
-        assert_eq!(plan_differences_at((&base, &one_damper), (&base, &no_values)).len(), 1);
-        // The path of this value has another name than the parameter.
-        let inertia = point_from(&[("rotor_inertia_22_kg_m2", 1.7)]);
-        let other_inertia = machine(140.0, 24.0, 1.7);
-        assert!(plan_differences_at((&base, &inertia), (&other_inertia, &no_values)).is_empty());
         assert_eq!(
-            plan_differences_at((&base, &inertia), (&machine(140.0, 24.0, 1.8), &no_values)).len(),
+            plan_differences_at((&base_plan, &one_damper), (&base_plan, &no_values)).len(),
+            1
+        );
+        // The path of this value has another name than the parameter.
+        let point_with_inertia = point_from(&[("rotor_inertia_22_kg_m2", 1.7)]);
+        let other_inertia = machine_plan(140.0, 24.0, 1.7);
+        assert!(
+            plan_differences_at((&base_plan, &point_with_inertia), (&other_inertia, &no_values))
+                .is_empty()
+        );
+        assert_eq!(
+            plan_differences_at(
+                (&base_plan, &point_with_inertia),
+                (&machine_plan(140.0, 24.0, 1.8), &no_values)
+            )
+            .len(),
             1
         );
         // The second plan lacks values of the first.
-        let incomplete = json!({ "rotor": {} });
-        let differences = plan_differences_at((&base, &no_values), (&incomplete, &no_values));
+        let incomplete_plan = json!({ "rotor": {} });
+        let differences =
+            plan_differences_at((&base_plan, &no_values), (&incomplete_plan, &no_values));
         assert_eq!(differences.len(), 3, "{differences:?}");
         assert!(
             differences[1].starts_with("machine.rotor.inertia_kg_m2 [1.0")

@@ -5,10 +5,10 @@ use crate::WasherFigures;
 use crate::kinds::MODES;
 use crate::stability::{self, UnstableSpeeds};
 use sweep_files::key;
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::Label;
 use sweep_plot::table::FigureTable;
-use sweep_plot::{DISTINCT, INK, MUTED, PlotError, extremes};
+use sweep_plot::{DISTINCT_COLOURS, INK, MUTED_COLOUR, PlotError, extremes};
 
 /// The frequency of a mode, or a sum of two modes' frequencies, over speed.
 pub(crate) struct FrequencyCurve {
@@ -41,7 +41,7 @@ pub(crate) fn campbell_chart(
         .flat_map(|mode| &mode.speeds_rpm)
         .fold(0.0_f64, |max_speed_rpm, &speed| max_speed_rpm.max(speed));
     if max_speed_rpm <= 0.0 || modes.iter().all(|mode| mode.speeds_rpm.len() < 2) {
-        return Err(table.source.nothing_to_draw("the modes are given at one speed only"));
+        return Err(table.source.nothing_to_draw_error("the modes are given at one speed only"));
     }
     let is_in_range = |mode: &FrequencyCurve| {
         mode.frequencies_rpm.iter().any(|&frequency| frequency < 1.06 * max_speed_rpm)
@@ -62,10 +62,12 @@ pub(crate) fn campbell_chart(
     let mut stars = Vec::new();
     let mode_curves = shown_modes.into_iter().enumerate().map(|(k, mut mode)| {
         let band = mode.band.take();
-        let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
-        (mode, DISTINCT[k % DISTINCT.len()], style)
+        let style =
+            band.map_or(SeriesStyle::Solid(2.2), |(low, high)| SeriesStyle::Band(low, high));
+        (mode, DISTINCT_COLOURS[k % DISTINCT_COLOURS.len()], style)
     });
-    let sum_curves = frequency_sum_curves.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    let sum_curves =
+        frequency_sum_curves.into_iter().map(|sum| (sum, MUTED_COLOUR, SeriesStyle::Dashed));
     for (mode, colour, style) in mode_curves.chain(sum_curves) {
         stars.extend(
             mode.resonances_rpm.iter().map(|&speed| (speed, speed, format!("{speed:.1} rpm"))),
@@ -78,10 +80,10 @@ pub(crate) fn campbell_chart(
         INK,
         diagonal.clone(),
         diagonal,
-        Style::Dashed,
+        SeriesStyle::Dashed,
     ));
     let mut notes = table.source.notes([]);
-    if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
+    if series.iter().any(|series| matches!(series.style, SeriesStyle::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
     }
     if !higher_modes.is_empty() {
@@ -95,12 +97,12 @@ pub(crate) fn campbell_chart(
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
         panels: vec![ChartPanel {
-            range: Some(frequency_range_rpm),
+            y_range: Some(frequency_range_rpm),
             height: 500.0,
             stars,
             ..panel
         }],
-        shades: unstable_speeds
+        shaded_ranges: unstable_speeds
             .map_or_else(Vec::new, |unstable_speeds| unstable_speeds.speed_ranges_rpm),
         shade_meaning: stability::UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()

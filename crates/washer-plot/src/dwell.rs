@@ -10,21 +10,23 @@ use crate::stability::{
     shown_channels, speed_chart,
 };
 use crate::{passages, trace};
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::{self, Label};
 use sweep_plot::read::{ColumnFacts, FigureFile};
 use sweep_plot::together::{self, NamedPoint};
-use sweep_plot::{Colour, DISTINCT, FAILED, INK, NONLINEAR, PlotError, extremes};
+use sweep_plot::{
+    Colour, DISTINCT_COLOURS, FAILED_COLOUR, INK, NONLINEAR_COLOUR, PlotError, extremes,
+};
 
 /// The kinds of attractors by their name in the file, in words, and with their colours. The last
 /// one stands for motions that did not settle.
 const ATTRACTOR_KINDS: [(&str, &str, Colour); 6] = [
-    ("periodic", "repeats every turn", NONLINEAR),
-    ("periodic_2", "every second turn", DISTINCT[2]),
-    ("periodic_m", "every few turns", DISTINCT[5]),
-    ("quasi_periodic", "two frequencies", DISTINCT[4]),
-    ("chaotic", "chaotic", DISTINCT[3]),
-    ("", "not settled", FAILED),
+    ("periodic", "repeats every turn", NONLINEAR_COLOUR),
+    ("periodic_2", "every second turn", DISTINCT_COLOURS[2]),
+    ("periodic_m", "every few turns", DISTINCT_COLOURS[5]),
+    ("quasi_periodic", "two frequencies", DISTINCT_COLOURS[4]),
+    ("chaotic", "chaotic", DISTINCT_COLOURS[3]),
+    ("", "not settled", FAILED_COLOUR),
 ];
 
 /// The name of the curve of a trace while the speed rises.
@@ -80,7 +82,7 @@ pub(crate) fn dwell_chart(
             let (x, y): (Vec<f64>, Vec<f64>) = attractor_points.unzip();
             if !y.is_empty() {
                 let name = format!("motion at a held speed: {words}");
-                series.push(Series::new(name, *colour, x, y, Style::Dots));
+                series.push(Series::new(name, *colour, x, y, SeriesStyle::Dots));
             }
         }
         let run_curves =
@@ -91,7 +93,7 @@ pub(crate) fn dwell_chart(
             let turns_in_range =
                 run.x.iter().zip(&run.y).filter(|(speed_rpm, _)| is_in_range(speed_rpm));
             let (x, y): (Vec<f64>, Vec<f64>) = turns_in_range.unzip();
-            Series::new("a run that passes these speeds", INK, x, y, Style::Solid(1.4))
+            Series::new("a run that passes these speeds", INK, x, y, SeriesStyle::Solid(1.4))
         }));
         let values = series.iter().flat_map(|series| &series.y).copied();
         let is_log = extremes(values.filter(|y| *y > 0.0))
@@ -160,7 +162,9 @@ pub(crate) fn section_chart(
     let held_points = HeldPoints::single(source, fixed_values, "--at")?;
     let columns = ["motion", YAW_COLUMN, PITCH_COLUMN];
     if columns.into_iter().any(|name| source.column(name).is_none()) {
-        return Err(source.nothing_to_draw("it keeps no states: `sweep dwell --sections N` does"));
+        return Err(
+            source.nothing_to_draw_error("it keeps no states: `sweep dwell --sections N` does")
+        );
     }
     // Each entry has the speed, the attractor's number, its kind, and its states.
     let mut attractors: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
@@ -177,12 +181,12 @@ pub(crate) fn section_chart(
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let (_, words, colour) = ATTRACTOR_KINDS[kind];
         let panel_name = format!("{} rpm", label::format_significant(speed_rpm, 6));
-        let colour_of_further_motion = DISTINCT[motion as usize % DISTINCT.len()];
+        let colour_of_further_motion = DISTINCT_COLOURS[motion as usize % DISTINCT_COLOURS.len()];
         let colour = if motion == 0.0 { colour } else { colour_of_further_motion };
         let name = format!("motion {motion}: {words}");
         let [yaw, pitch]: [Vec<f64>; 2] =
             [0, 1].map(|k| states.iter().map(|state| state[k]).collect());
-        let series = Series::new(name, colour, yaw, pitch, Style::Dots);
+        let series = Series::new(name, colour, yaw, pitch, SeriesStyle::Dots);
         match panels.last_mut().filter(|panel| panel.name == panel_name) {
             Some(panel) => panel.series.push(series),
             None => {

@@ -4,10 +4,10 @@
 use crate::WasherFigures;
 use crate::kinds::speed_mark;
 use crate::trace;
-use sweep_plot::chart::{Chart, Series, Style};
+use sweep_plot::chart::{Chart, Series, SeriesStyle};
 use sweep_plot::label::Label;
 use sweep_plot::table::FigureTable;
-use sweep_plot::{DISTINCT, PlotError};
+use sweep_plot::{DISTINCT_COLOURS, PlotError};
 
 /// A part of a trace in which the speed only rises or only falls, by its first and last instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ pub(crate) fn passage_chart(
     if all_turns.is_empty() {
         return Err(table
             .source
-            .nothing_to_draw("the drum makes no whole turn while its speed changes"));
+            .nothing_to_draw_error("the drum makes no whole turn while its speed changes"));
     }
     chart.panels.retain(|panel| panel.name != "gap" && panel.name != "speed");
     for panel in &mut chart.panels {
@@ -67,7 +67,7 @@ pub(crate) fn passage_chart(
     chart.x_label = Label::new("Spin speed", "rpm");
     chart.marks = resonances.into_iter().map(|speed| speed_mark(speed, speed)).collect();
     chart.mark_meaning = "resonance speed".to_owned();
-    chart.shades = trace::unstable_speeds(table, options)?;
+    chart.shaded_ranges = trace::unstable_speeds(table, options)?;
     Ok(chart)
 }
 
@@ -85,10 +85,10 @@ fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
             .iter()
             .map(|&[first_row, last_row]| greatest_magnitude(&series.y[first_row..=last_row]))
             .collect();
-        let style = if is_dashed { Style::Dashed } else { Style::Solid(1.8) };
+        let style = if is_dashed { SeriesStyle::Dashed } else { SeriesStyle::Solid(1.8) };
         Series::new(
             name,
-            DISTINCT[usize::from(!turns.is_rising)],
+            DISTINCT_COLOURS[usize::from(!turns.is_rising)],
             turns.speeds_rpm.clone(),
             y,
             style,

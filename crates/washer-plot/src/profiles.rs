@@ -3,10 +3,10 @@
 
 use serde_json::Value;
 
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::{self, Label};
 use sweep_plot::table::FigureTable;
-use sweep_plot::{DISTINCT, MUTED, PlotError};
+use sweep_plot::{DISTINCT_COLOURS, MUTED_COLOUR, PlotError};
 
 /// The 95 % quantile of the chi-squared distribution with one degree of freedom: the cost above the
 /// least at either end of a 95 % interval.
@@ -18,7 +18,7 @@ const CHI2_1_95: f64 = 3.84;
 /// [`PlotError::Undrawable`] for a file without profiles.
 pub(crate) fn profile_chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let no_profiles_error = || {
-        table.source.nothing_to_draw(
+        table.source.nothing_to_draw_error(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
         )
     };
@@ -33,15 +33,15 @@ pub(crate) fn profile_chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let series = profiles.iter().enumerate().map(|(k, profile)| {
         let name = label::name_in_words(profile["name"].as_str().unwrap_or_default());
         let y = read_numbers(&profile["cost_above"]);
-        Series::new(name, DISTINCT[k % 6], deviations.clone(), y, Style::Solid(1.8))
+        Series::new(name, DISTINCT_COLOURS[k % 6], deviations.clone(), y, SeriesStyle::Solid(1.8))
     });
     let parabola_values = deviations.iter().map(|deviation| deviation * deviation).collect();
     let parabola = Series::new(
         "by the standard errors",
-        MUTED,
+        MUTED_COLOUR,
         deviations.clone(),
         parabola_values,
-        Style::Dashed,
+        SeriesStyle::Dashed,
     );
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {

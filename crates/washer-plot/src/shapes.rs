@@ -3,10 +3,10 @@
 use serde_json::Value;
 use sweep_files::key;
 
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::{self, Label};
 use sweep_plot::table::FigureTable;
-use sweep_plot::{DISTINCT, PlotError};
+use sweep_plot::{DISTINCT_COLOURS, PlotError};
 
 /// Minimum separation of the drum's axis from the tub's that is drawn, relative to the greatest
 /// deflection. Basis: smaller ones cannot be seen. Doubling it hides slight bending.
@@ -33,7 +33,7 @@ type AxisShape = [Vec<Phasor>; 2];
 /// [`PlotError::Undrawable`] if the file has no machine or no resonances.
 pub(crate) fn shape_chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let positions = axis_positions(table).ok_or_else(|| {
-        table.source.nothing_to_draw("the file does not say where the machine's parts are")
+        table.source.nothing_to_draw_error("the file does not say where the machine's parts are")
     })?;
     let mut panels = Vec::new();
     for mode in table.source.metadata_list(key::MODES) {
@@ -48,7 +48,7 @@ pub(crate) fn shape_chart(table: &FigureTable) -> Result<Chart, PlotError> {
             let words = format!("{}, {speed:.1} rpm", label::capitalise(name));
             let label = Label::new(&words, "");
             panels.push(ChartPanel {
-                range: Some((-1.15, 1.15)),
+                y_range: Some((-1.15, 1.15)),
                 height: 200.0,
                 ..ChartPanel::new(
                     &format!("shape {panel_number}"),
@@ -59,7 +59,7 @@ pub(crate) fn shape_chart(table: &FigureTable) -> Result<Chart, PlotError> {
         }
     }
     if panels.is_empty() {
-        return Err(table.source.nothing_to_draw(
+        return Err(table.source.nothing_to_draw_error(
             "the file holds no resonance; `sweep modes --speed` over faster speeds may",
         ));
     }
@@ -145,12 +145,12 @@ fn shape_series(positions: &AxisPositions, phasors: &[Phasor]) -> Vec<Series> {
             // The real part of exp(i w t) comes first; a quarter of a period later it is minus the
             // imaginary part.
             for (component, sign, style, suffix) in [
-                (0, 1.0, Style::Solid(2.6), ""),
-                (1, -1.0, Style::Dashed, ", a quarter of a period later"),
+                (0, 1.0, SeriesStyle::Solid(2.6), ""),
+                (1, -1.0, SeriesStyle::Dashed, ", a quarter of a period later"),
             ] {
                 let name = format!("{body}{direction}{suffix}");
                 let y = line.iter().map(|phasor| sign * phasor[component]).collect();
-                series.push(Series::new(name, DISTINCT[colour], x.to_vec(), y, style));
+                series.push(Series::new(name, DISTINCT_COLOURS[colour], x.to_vec(), y, style));
             }
         };
         add_real_and_imaginary("", &positions.tub_x_m, &tub_curve, k);

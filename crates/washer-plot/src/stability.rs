@@ -6,17 +6,17 @@ use std::path::Path;
 use crate::WasherFigures;
 use crate::kinds::{MACHINE_SECTIONS, MODEL_KINDS, STABILITY, speed_mark};
 use crate::machine::unbalance_and_damping;
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::{self, Label};
 use sweep_plot::read::{ColumnFacts, FigureFile, list_names};
 use sweep_plot::swept::{self, SweptAxis};
 use sweep_plot::table::FigureTable;
 use sweep_plot::together::{self, NamedPoint};
-use sweep_plot::{DISTINCT, LINEAR, NONLINEAR, PlotError};
+use sweep_plot::{DISTINCT_COLOURS, LINEAR_COLOUR, NONLINEAR_COLOUR, PlotError};
 
 /// Maximum number of points whose growth is drawn. Basis: each point needs a distinct colour.
 /// Doubling it repeats colours.
-const MAX_CURVES: usize = DISTINCT.len();
+const MAX_CURVES: usize = DISTINCT_COLOURS.len();
 
 /// The channels whose responses are drawn by default, as in charts of traces.
 const DEFAULT_CHANNELS: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
@@ -66,7 +66,7 @@ pub(crate) fn growth_chart(
     let series = curves.iter().zip(shown_points).enumerate().map(|(k, (curve, values))| {
         let x = curve.speeds_rpm.clone();
         let y = curve.growths_per_s.clone();
-        Series::new(curve_name(values), DISTINCT[k], x, y, Style::Solid(2.2))
+        Series::new(curve_name(values), DISTINCT_COLOURS[k], x, y, SeriesStyle::Solid(2.2))
     });
     let constant_axes =
         axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !is_varying_axis(*k));
@@ -78,7 +78,7 @@ pub(crate) fn growth_chart(
     let label = Label::new("Growth of a small disturbance", "1/s");
     let levels = vec![(0.0, "unstable above".to_owned())];
     let channel_panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
-    let (shades, edges) = match &curves[..] {
+    let (shaded_ranges, edges) = match &curves[..] {
         [curve] => (
             unstable_ranges(&curve.speeds_rpm, &curve.growths_per_s),
             stability_edges(&curve.speeds_rpm, &curve.growths_per_s),
@@ -94,7 +94,7 @@ pub(crate) fn growth_chart(
         panels: vec![channel_panel],
         marks,
         mark_meaning: "edge".to_owned(),
-        shades,
+        shaded_ranges,
         shade_meaning: UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()
     })
@@ -145,7 +145,7 @@ pub(crate) fn speed_chart(
         title: title.to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
+        shaded_ranges: unstable_ranges(&curves.speeds_rpm, &curves.growths_per_s),
         shade_meaning: UNSTABLE_SPEEDS_MEANING.to_owned(),
         panels,
         ..Chart::default()
@@ -196,9 +196,15 @@ pub(crate) fn response_series(
         Series::new(format!("{name}, {word}"), colour, speed, values, style)
     };
     vec![
-        Series::new("linear model", LINEAR, curves.speeds_rpm.clone(), linear, Style::Solid(1.6)),
-        part_series("stable", NONLINEAR, stable, Style::Solid(2.2)),
-        part_series("unstable", NONLINEAR, unstable, Style::Dashed),
+        Series::new(
+            "linear model",
+            LINEAR_COLOUR,
+            curves.speeds_rpm.clone(),
+            linear,
+            SeriesStyle::Solid(1.6),
+        ),
+        part_series("stable", NONLINEAR_COLOUR, stable, SeriesStyle::Solid(2.2)),
+        part_series("unstable", NONLINEAR_COLOUR, unstable, SeriesStyle::Dashed),
     ]
 }
 
@@ -247,7 +253,7 @@ pub(crate) fn shown_channels(
     requested: &[String],
 ) -> Result<Vec<bool>, PlotError> {
     if let Some(unknown) = requested.iter().find(|name| !names.contains(&name.as_str())) {
-        return Err(source.unknown_name("--channel", unknown, "channel", names.join(", ")));
+        return Err(source.unknown_name_error("--channel", unknown, "channel", names.join(", ")));
     }
     let default_channels: Vec<&str> =
         DEFAULT_CHANNELS.into_iter().filter(|name| names.contains(name)).collect();
@@ -344,7 +350,8 @@ impl<'a> HeldPoints<'a> {
         let axis_index = |name: &str| {
             let names = || held_points.axes.iter().map(|axis| axis.name.as_str());
             let axis_index = names().position(|axis| axis == name);
-            axis_index.ok_or_else(|| source.unknown_name(option, name, "axis", list_names(names())))
+            axis_index
+                .ok_or_else(|| source.unknown_name_error(option, name, "axis", list_names(names())))
         };
         let requested_values_by_axis =
             requested_values.iter().map(|(name, value)| Ok((axis_index(name)?, *value)));
@@ -363,13 +370,13 @@ impl<'a> HeldPoints<'a> {
             }
         })?;
         if !has_rows {
-            return Err(source.nothing_to_draw("it has no rows"));
+            return Err(source.nothing_to_draw_error("it has no rows"));
         }
         if points.is_empty() {
             let values_in_words =
                 requested_values.iter().map(|(name, value)| format!("{name}={value}"));
             let values_in_words = values_in_words.collect::<Vec<_>>().join(", ");
-            return Err(source.unknown_name(
+            return Err(source.unknown_name_error(
                 option,
                 values_in_words,
                 "point",

@@ -12,7 +12,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
-use self::sample::{SampleFile, map};
+use self::sample::{SampleFile, map_sample};
 use super::*;
 
 /// Options with which a test draws.
@@ -301,7 +301,7 @@ fn a_live_page_contains_the_module_and_its_setup() {
         ..Live::default()
     };
     let options = WasherFigures { live: Some(live), ..WasherFigures::default() };
-    let page = draw(map(), &options, "a.html").unwrap();
+    let page = draw(map_sample(), &options, "a.html").unwrap();
     let live = &page_data(&page)["live"];
     let compressed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
     let mut module = Vec::new();
@@ -318,7 +318,7 @@ fn a_live_page_contains_the_module_and_its_setup() {
     assert_eq!(live["kinds"][0], "period doubling");
     assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
     assert!(
-        error_message(draw(map(), &options, "a.svg"))
+        error_message(draw(map_sample(), &options, "a.svg"))
             .contains("`--live` is for maps drawn as .html")
     );
 }
@@ -336,7 +336,7 @@ fn a_page_contains_the_histories_of_a_folder() {
     };
     trace_without_point().write(folder.path(), "point-7.parquet");
     let options = PlotOptions { traces: Some(folder.path().to_owned()), ..PlotOptions::default() };
-    let page_data = draw_page_data(map(), &options);
+    let page_data = draw_page_data(map_sample(), &options);
     // Mass 0.4 is the fourth of ten values, damping 120 the third of nine.
     assert_eq!(page_data["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29", "7"]);
     let history = &page_data["traces"]["29"];
@@ -355,7 +355,8 @@ fn a_page_contains_the_histories_of_a_folder() {
     );
     trace_of_unknown_point.write(folder.path(), "point-90.parquet");
     assert!(
-        error_message(draw(map(), &options, "a.html")).contains("belongs to no point of this map")
+        error_message(draw(map_sample(), &options, "a.html"))
+            .contains("belongs to no point of this map")
     );
 }
 
@@ -420,10 +421,10 @@ fn options_without_effect_are_rejected() {
     let options_against =
         WasherFigures { against: Some("b.parquet".into()), ..with_view(FigureView::Passages) };
     for (result, phrase) in [
-        (draw(map(), &channel("body_yaw"), "a.svg"), "--quantity ratio_tub_yaw"),
+        (draw(map_sample(), &channel("body_yaw"), "a.svg"), "--quantity ratio_tub_yaw"),
         (draw(trace(), &channel("tub_pitch"), "a.svg"), "it has tub_yaw, drum_front_y"),
-        (draw(map(), &resonances, "a.svg"), "`--resonances` is for traces"),
-        (draw(map(), &with_view(FigureView::Time), "a.svg"), "`--view` is for traces"),
+        (draw(map_sample(), &resonances, "a.svg"), "`--resonances` is for traces"),
+        (draw(map_sample(), &with_view(FigureView::Time), "a.svg"), "`--view` is for traces"),
         (draw(trace(), &with_view(FigureView::Shapes), "a.svg"), "`--view` is for modes files"),
         (draw(trace(), &options_against, "a.svg"), "`--against` is for traces over time"),
         (

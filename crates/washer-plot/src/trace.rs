@@ -7,12 +7,12 @@ use crate::WasherFigures;
 use crate::kinds::{MACHINE_SECTIONS, MODEL_KINDS, speed_mark};
 use crate::machine::unbalance_and_damping;
 use crate::{campbell, stability};
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::{self, Label};
 use sweep_plot::read::FigureKind;
 use sweep_plot::table::FigureTable;
 use sweep_plot::together::{self, NamedPoint};
-use sweep_plot::{INK, LINEAR, NONLINEAR, PlotError, extremes};
+use sweep_plot::{INK, LINEAR_COLOUR, NONLINEAR_COLOUR, PlotError, extremes};
 
 /// Draws the chart of a trace file.
 ///
@@ -25,7 +25,7 @@ pub(crate) fn trace_chart(
 ) -> Result<Chart, PlotError> {
     let times_s = Rc::new(table.numbers("time_s")?.to_vec());
     if times_s.len() < 2 {
-        return Err(table.source.nothing_to_draw("a trace needs at least two instants"));
+        return Err(table.source.nothing_to_draw_error("a trace needs at least two instants"));
     }
     if table.column("point").is_some() {
         let path = table.source.path.display();
@@ -53,15 +53,15 @@ pub(crate) fn trace_chart(
     let front_table = compared_trace.as_ref().unwrap_or(table);
     let front_times_s = Rc::new(front_table.numbers("time_s")?.to_vec());
     let curve_sources = [
-        (table, Rc::clone(&times_s), NONLINEAR),
-        (front_table, front_times_s, LINEAR.with_alpha(165)),
+        (table, Rc::clone(&times_s), NONLINEAR_COLOUR),
+        (front_table, front_times_s, LINEAR_COLOUR.with_alpha(165)),
     ];
     let model_curves = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let model_curve = |k: usize| {
             let ((table, times_s, colour), name) = (&curve_sources[k], curve_names[k].clone());
             let column = table.column(&columns[if compared_trace.is_some() { 0 } else { k }])?;
             let y = column.numbers()?.iter().map(|value| value * factor).collect();
-            Some(Series::new(name, *colour, Rc::clone(times_s), y, Style::Solid(1.3)))
+            Some(Series::new(name, *colour, Rc::clone(times_s), y, SeriesStyle::Solid(1.3)))
         };
         (0..2).filter_map(model_curve).collect()
     };
@@ -82,7 +82,7 @@ pub(crate) fn trace_chart(
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::display_unit(column.facts.unit());
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual = Series::new("residual", INK, Rc::clone(&times_s), y, Style::Dots);
+        let residual = Series::new("residual", INK, Rc::clone(&times_s), y, SeriesStyle::Dots);
         let words = format!("residual, {}", label::name_in_words(name));
         let is_shown = shown_names.contains(&name);
         let label = Label::new(&words, unit);
@@ -104,15 +104,15 @@ pub(crate) fn trace_chart(
         panels.push(ChartPanel { levels, ..gap_panel });
     }
     let mut marks = Vec::new();
-    let mut shades = Vec::new();
+    let mut shaded_ranges = Vec::new();
     let unstable_ranges = unstable_speeds(table, options)?;
     let (resonances, other_machine_note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         let passages = passage_times(&times_s, speed, &resonances).into_iter();
         marks.extend(passages.map(|(x, resonance)| speed_mark(x, resonance)));
-        shades = stability::intervals_within(&times_s, speed, &unstable_ranges);
+        shaded_ranges = stability::intervals_within(&times_s, speed, &unstable_ranges);
         let x = Rc::clone(&times_s);
-        let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
+        let series = Series::new("", INK, x, speed.to_vec(), SeriesStyle::Solid(2.0));
         let speed_panel = trace_panel("speed", Label::new("spin", "rpm"), true, vec![series]);
         panels.push(ChartPanel { height: 130.0, ..speed_panel });
     }
@@ -134,7 +134,7 @@ pub(crate) fn trace_chart(
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
-        shades,
+        shaded_ranges,
         shade_meaning: stability::UNSTABLE_SPEEDS_MEANING.to_owned(),
         ..Chart::default()
     })

@@ -1,10 +1,10 @@
 //! The variation of natural frequencies over a turn of the drum (the paper's Fig. 7b).
 
 use crate::campbell::{interpolate, read_modes};
-use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::chart::{Chart, ChartPanel, Series, SeriesStyle};
 use sweep_plot::label::Label;
 use sweep_plot::table::FigureTable;
-use sweep_plot::{DISTINCT, PlotError};
+use sweep_plot::{DISTINCT_COLOURS, PlotError};
 
 /// Draws the variation in a modes file: for each mode with a resonance, half the difference between
 /// its greatest and least frequency over a turn, as a share of the mean.
@@ -32,17 +32,17 @@ pub(crate) fn variation_chart(table: &FigureTable) -> Result<Chart, PlotError> {
                 format!("{speed:.1} rpm"),
             ));
         }
-        let colour = DISTINCT[k % DISTINCT.len()];
+        let colour = DISTINCT_COLOURS[k % DISTINCT_COLOURS.len()];
         series.push(Series::new(
             mode.name,
             colour,
             mode.speeds_rpm,
             variations_percent,
-            Style::Solid(2.2),
+            SeriesStyle::Solid(2.2),
         ));
     }
     if series.is_empty() {
-        return Err(table.source.nothing_to_draw("no mode's frequency meets the spin speed"));
+        return Err(table.source.nothing_to_draw_error("no mode's frequency meets the spin speed"));
     }
     let label = Label::new("Variation over a turn", "± % of the mean");
     Ok(Chart {

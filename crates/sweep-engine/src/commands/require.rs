@@ -9,7 +9,7 @@ use serde_json::json;
 use super::{conditions, format_cell, format_table};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, show};
-use sweep_plot::Share;
+use sweep_plot::ShareInterval;
 use sweep_results::{Cell, Condition, ConditionCheck, ResultTable, check_condition};
 
 /// Arguments of `sweep require`.
@@ -121,7 +121,7 @@ fn is_random(file: &ResultTable) -> bool {
 /// Computes Wilson's interval of every share.
 fn share_intervals(condition_check: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
     let interval = |(count, rows): (&Option<u64>, &u64)| {
-        let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
+        let share = ShareInterval::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
     condition_check.share_counts.iter().zip(&condition_check.aggregate_rows).map(interval).collect()

@@ -13,7 +13,7 @@ use crate::{
     threads,
 };
 use sweep_parameter::RatioLimits;
-use sweep_plot::Share;
+use sweep_plot::ShareInterval;
 
 /// The arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
@@ -256,8 +256,8 @@ pub(super) fn format_named_values<'a>(values: impl Iterator<Item = (&'a str, f64
 
 /// Returns the share of so many rows among those with a verdict, as `share(reliable)` counts it;
 /// `None` if no row has a verdict.
-fn verdict_share(rows: u64, tally: &Tally) -> Option<Share> {
-    Share::wilson(rows, tally.reliable + tally.unreliable)
+fn verdict_share(rows: u64, tally: &Tally) -> Option<ShareInterval> {
+    ShareInterval::wilson(rows, tally.reliable + tally.unreliable)
 }
 
 /// Formats a fraction as a percentage.
@@ -270,7 +270,7 @@ fn percent(fraction: f64) -> String {
 fn format_share(tally: &Tally) -> String {
     match verdict_share(tally.reliable, tally) {
         None => "no point has a verdict".to_owned(),
-        Some(Share { fraction, low, high }) => {
+        Some(ShareInterval { fraction, low, high }) => {
             let [share, low, high] = [fraction, low, high].map(percent);
             format!(
                 "{share} % reliable, with 95 % confidence {low} to {high} % for points at random"

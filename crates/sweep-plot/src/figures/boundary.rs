@@ -5,8 +5,8 @@ use sweep_files::key;
 use sweep_parameter::Worse;
 
 use crate::axis::is_log_spaced;
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::DISTINCT;
+use crate::chart::{Chart, ChartPanel, Series, SeriesStyle};
+use crate::colour::DISTINCT_COLOURS;
 use crate::error::Result;
 use crate::read::bracket_columns;
 use crate::table::{FigureColumn, FigureTable};
@@ -29,12 +29,13 @@ struct BoundaryPoint {
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] with fewer than two points.
-pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
+pub(crate) fn boundary_chart(table: &FigureTable) -> Result<Chart> {
     let columns: Vec<&FigureColumn> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
-    let too_few_points = || table.source.nothing_to_draw("a curve needs at least two points");
-    let (low, high) = bracket_columns(&names).ok_or_else(too_few_points)?;
+    let too_few_points_error =
+        || table.source.nothing_to_draw_error("a curve needs at least two points");
+    let (low, high) = bracket_columns(&names).ok_or_else(too_few_points_error)?;
     let x_column = columns[0];
     let y_column = columns[1];
     let xs = table.numbers(&x_column.facts.name)?;
@@ -45,7 +46,7 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
     x_values.sort_by(f64::total_cmp);
     x_values.dedup();
     if x_values.len() < 2 {
-        return Err(too_few_points());
+        return Err(too_few_points_error());
     }
     let quantities_at_ends = ["quantity_low", "quantity_high"]
         .map(|name| table.column(name).and_then(FigureColumn::numbers));
@@ -63,26 +64,28 @@ pub(crate) fn chart(table: &FigureTable) -> Result<Chart> {
             high: highs[row],
             is_rising: is_rising(row),
         };
-        let further_axes = further_axes(table, row);
-        match curves.iter_mut().find(|(name, _)| *name == further_axes) {
+        let further_axes_text = describe_further_axes(table, row);
+        match curves.iter_mut().find(|(name, _)| *name == further_axes_text) {
             Some((_, points)) => points.push(point),
-            None => curves.push((further_axes, vec![point])),
+            None => curves.push((further_axes_text, vec![point])),
         }
     }
     let limit_text = limit_in_words(table);
     let mut series = Vec::new();
-    for (k, (further_axes, points)) in curves.iter().enumerate() {
-        let name = if further_axes.is_empty() {
+    for (k, (further_axes_text, points)) in curves.iter().enumerate() {
+        let name = if further_axes_text.is_empty() {
             format!("boundary: {limit_text}, bracket shaded")
         } else {
-            format!("{limit_text}, {further_axes}")
+            format!("{limit_text}, {further_axes_text}")
         };
-        let colour = DISTINCT[k % DISTINCT.len()];
+        let colour = DISTINCT_COLOURS[k % DISTINCT_COLOURS.len()];
         series.extend(join_curves(&x_values, points).into_iter().map(|branch| {
             let collect_values =
                 |value: fn(&BoundaryPoint) -> f64| branch.iter().map(value).collect::<Vec<f64>>();
-            let style =
-                Style::Band(collect_values(|point| point.low), collect_values(|point| point.high));
+            let style = SeriesStyle::Band(
+                collect_values(|point| point.low),
+                collect_values(|point| point.high),
+            );
             Series::new(
                 name.clone(),
                 colour,
@@ -132,8 +135,8 @@ fn upper_region_note(
             Some(false) => falling_words,
             None => return String::new(),
         };
-    let line = if crossing_count > uppermost.len() { "highest crossing" } else { "line" };
-    format!(" · {region_words} above the {line}")
+    let line_words = if crossing_count > uppermost.len() { "highest crossing" } else { "line" };
+    format!(" · {region_words} above the {line_words}")
 }
 
 /// Returns the name of the quantity, which is that of its column in a map.
@@ -205,14 +208,14 @@ pub(crate) struct Overlay {
 ///
 /// # Errors
 /// [`PlotError::Unfit`] if it has other axes; otherwise as [`chart`].
-pub(crate) fn overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
+pub(crate) fn boundary_overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
     let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
         let [names, axes] = [&names[..], &axes].map(|names| names.join(", "));
         let phrase = format!("is a boundary over {names}; the map is over {axes}");
         return Err(PlotError::Unfit(format!("{} {phrase}", table.source.path.display())));
     }
-    let chart = chart(table)?;
+    let chart = boundary_chart(table)?;
     let name = format!("traced boundary: {}", limit_in_words(table));
     let series = chart.panels.into_iter().flat_map(|panel| panel.series);
     let lines = series.map(|series| series.x.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
@@ -240,7 +243,7 @@ fn limit_in_words(table: &FigureTable) -> String {
 }
 
 /// Returns the values of the axes beyond the second, which the plan in the file names.
-fn further_axes(table: &FigureTable, row: usize) -> String {
+fn describe_further_axes(table: &FigureTable, row: usize) -> String {
     let values = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
@@ -254,35 +257,36 @@ fn further_axes(table: &FigureTable, row: usize) -> String {
 /// nearest.
 fn join_curves(x_values: &[f64], points: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
     /// A gap of a curve.
-    const GAP: BoundaryPoint =
+    const GAP_POINT: BoundaryPoint =
         BoundaryPoint { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, is_rising: None };
-    let height = |point: &BoundaryPoint| {
+    let point_height = |point: &BoundaryPoint| {
         if point.y.is_nan() { 0.5 * (point.low + point.high) } else { point.y }
     };
     let mut curves: Vec<Vec<BoundaryPoint>> = Vec::new();
     for (k, &x) in x_values.iter().enumerate() {
-        let points_at_x = points.iter().filter(|point| point.x == x && height(point).is_finite());
+        let points_at_x =
+            points.iter().filter(|point| point.x == x && point_height(point).is_finite());
         let points_at_x: Vec<BoundaryPoint> = points_at_x.copied().collect();
         // Pairs of a curve that had a point at the last x and a point at this one, nearest first.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (curve, curve_points) in curves.iter().enumerate() {
             for (point, new_point) in points_at_x.iter().enumerate() {
-                let distance = (height(&curve_points[k - 1]) - height(new_point)).abs();
+                let distance = (point_height(&curve_points[k - 1]) - point_height(new_point)).abs();
                 if distance.is_finite() && curve_points[k - 1].is_rising == new_point.is_rising {
                     pairs.push((distance, curve, point));
                 }
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut curve_of_point = vec![None; points_at_x.len()];
+        let mut curve_by_point = vec![None; points_at_x.len()];
         for (_, curve, point) in pairs {
-            if curve_of_point[point].is_none() && !curve_of_point.contains(&Some(curve)) {
-                curve_of_point[point] = Some(curve);
+            if curve_by_point[point].is_none() && !curve_by_point.contains(&Some(curve)) {
+                curve_by_point[point] = Some(curve);
             }
         }
-        for (point, curve) in points_at_x.into_iter().zip(curve_of_point) {
+        for (point, curve) in points_at_x.into_iter().zip(curve_by_point) {
             let curve = curve.unwrap_or_else(|| {
-                curves.push(vec![GAP; x_values.len()]);
+                curves.push(vec![GAP_POINT; x_values.len()]);
                 curves.len() - 1
             });
             curves[curve][k] = point;
@@ -297,19 +301,19 @@ mod tests {
 
     #[test]
     fn a_fold_continues_the_nearest_curve() {
-        let point =
+        let create_point =
             |x: f64, y: f64| BoundaryPoint { x, y, low: y - 0.1, high: y + 0.1, is_rising: None };
         let points = [
-            point(1.0, 250.0),
-            point(2.0, 238.0),
-            point(2.0, 239.0),
-            point(2.0, 259.0),
-            point(3.0, 243.0),
-            point(3.0, 265.0),
+            create_point(1.0, 250.0),
+            create_point(2.0, 238.0),
+            create_point(2.0, 239.0),
+            create_point(2.0, 259.0),
+            create_point(3.0, 243.0),
+            create_point(3.0, 265.0),
         ];
         let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0, 3.0], &points)
             .iter()
-            .map(|curve| curve.iter().map(|point| point.y).collect())
+            .map(|curve| curve.iter().map(|create_point| create_point.y).collect())
             .collect();
         assert_eq!(curves[0], [250.0, 259.0, 265.0]);
         assert_eq!(curves.len(), 3);
@@ -319,7 +323,7 @@ mod tests {
 
     #[test]
     fn curves_of_opposite_sides_do_not_cross() {
-        let point = |x: f64, y: f64, rising| BoundaryPoint {
+        let create_point = |x: f64, y: f64, rising| BoundaryPoint {
             x,
             y,
             low: y - 0.1,
@@ -327,14 +331,14 @@ mod tests {
             is_rising: Some(rising),
         };
         let points = [
-            point(1.0, 238.5, false),
-            point(1.0, 239.6, true),
-            point(2.0, 240.0, false),
-            point(2.0, 245.4, true),
+            create_point(1.0, 238.5, false),
+            create_point(1.0, 239.6, true),
+            create_point(2.0, 240.0, false),
+            create_point(2.0, 245.4, true),
         ];
         let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0], &points)
             .iter()
-            .map(|curve| curve.iter().map(|point| point.y).collect())
+            .map(|curve| curve.iter().map(|create_point| create_point.y).collect())
             .collect();
         assert_eq!(curves, [[238.5, 240.0], [239.6, 245.4]]);
     }

@@ -1,8 +1,8 @@
 //! The figure of a map file over one axis: ratios, amplitudes and gaps as curves.
 
 use crate::PlotOptions;
-use crate::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
-use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
+use crate::chart::{Chart, ChartPanel, Mark, Series, SeriesStyle, spans_decades};
+use crate::colour::{DISTINCT_COLOURS, LINEAR_COLOUR, NONLINEAR_COLOUR};
 use crate::error::{PlotError, Result};
 use crate::gather::CellMap;
 use crate::label::{self, Label};
@@ -15,7 +15,7 @@ use crate::table::FigureColumn;
 const MAX_MARKS: usize = 400;
 
 /// Returns the title for the requested columns, with the channel if it is the only one.
-fn title(source: &FigureFile, requested: &[ShownColumn]) -> String {
+fn curves_title(source: &FigureFile, requested: &[ShownColumn]) -> String {
     let Some(first) = requested.first() else { return RATIOS_TITLE.to_owned() };
     let is_single_channel = requested.iter().all(|shown| shown.channel == first.channel);
     match (first.group, first.channel.as_ref().filter(|_| is_single_channel)) {
@@ -38,7 +38,7 @@ const RATIOS_TITLE: &str = "Where the linear model can be trusted";
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
-pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn curves_chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
     let axis = &map.grid.axes[0];
     let table = &map.table;
     let source = &table.source;
@@ -50,12 +50,13 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
                 .to_owned(),
         ));
     };
-    let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.has_points(cell)).collect();
-    let xs: Vec<f64> = cells.iter().map(|&cell| axis.values[cell]).collect();
+    let filled_cells: Vec<usize> =
+        (0..map.point_counts.len()).filter(|&cell| map.has_points(cell)).collect();
+    let xs: Vec<f64> = filled_cells.iter().map(|&cell| axis.values[cell]).collect();
     let column_series = |name: &str, colour: Colour, column: &FigureColumn, factor: f64| {
         let values = column.numbers().unwrap_or_default();
-        let y = cells.iter().map(|&cell| values[cell] * factor).collect();
-        Series::new(name, colour, xs.clone(), y, Style::Solid(2.2))
+        let y = filled_cells.iter().map(|&cell| values[cell] * factor).collect();
+        Series::new(name, colour, xs.clone(), y, SeriesStyle::Solid(2.2))
     };
     let requested_ratios: Vec<&ShownColumn> =
         requested.iter().filter(|shown| shown.group == ColumnGroup::Ratio).collect();
@@ -70,15 +71,15 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
     let quantity_panel = |quantity: layer::QuantityColumns<'_>| {
         let columns = &quantity.columns;
         let (unit, factor) = label::display_unit(columns[0].1.unit());
-        let lines = columns.iter().filter_map(|(model, facts)| {
+        let series = columns.iter().filter_map(|(model, facts)| {
             let name = if model.is_empty() { String::new() } else { format!("{model} model") };
-            let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
+            let colour = if *model == "linear" { LINEAR_COLOUR } else { NONLINEAR_COLOUR };
             Some(column_series(&name, colour, table.column(&facts.name)?, factor))
         });
         let limit = columns[0].1.metadata.limit.map(|limit| limit * factor);
         let is_requested = |name: &String| requested.iter().any(|shown| shown.name() == name);
         let label = Label::new(&label::capitalise(&quantity.words), unit);
-        let panel = ChartPanel::new(&quantity.name, label, lines.collect());
+        let panel = ChartPanel::new(&quantity.name, label, series.collect());
         ChartPanel {
             is_shown: columns.iter().any(|(_, facts)| is_requested(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
@@ -86,13 +87,16 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
             ..panel
         }
     };
-    panels.extend(layer::quantities(source).into_iter().map(quantity_panel));
+    panels.extend(layer::collect_quantities(source).into_iter().map(quantity_panel));
     panels.retain(|panel| !panel.series.is_empty());
 
-    let failed: Vec<usize> =
-        cells.iter().copied().filter(|&cell| map.counts[cell].failed > 0).collect();
-    let mark_stride = failed.len().div_ceil(MAX_MARKS).max(1);
-    let mark = |&cell: &usize| Mark {
+    let failed_cells: Vec<usize> = filled_cells
+        .iter()
+        .copied()
+        .filter(|&cell| map.point_counts[cell].failed_points > 0)
+        .collect();
+    let mark_stride = failed_cells.len().div_ceil(MAX_MARKS).max(1);
+    let to_mark = |&cell: &usize| Mark {
         x: axis.values[cell],
         label: map.common_status(cell).unwrap_or("some failed").replace('_', " "),
     };
@@ -102,11 +106,11 @@ pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
         format!("failed: no result; one of {mark_stride} places is marked")
     };
     Ok(Chart {
-        title: title(source, &requested),
-        subtitle: super::map::subtitle(map, &[]),
-        x_label: Label::new(&axis.swept.words, &axis.swept.unit),
-        is_x_log: axis.swept.is_log,
-        marks: failed.iter().step_by(mark_stride).map(mark).collect(),
+        title: curves_title(source, &requested),
+        subtitle: super::map::map_subtitle(map, &[]),
+        x_label: Label::new(&axis.swept_axis.words, &axis.swept_axis.unit),
+        is_x_log: axis.swept_axis.is_log,
+        marks: failed_cells.iter().step_by(mark_stride).map(to_mark).collect(),
         mark_meaning,
         panels,
         ..Chart::default()
@@ -126,7 +130,7 @@ fn ratio_panel(
         let column = map.table.column(&facts.name).filter(|_| is_channel_requested(name))?;
         Some(column_series(
             &label::channel_in_words(name),
-            DISTINCT[k % DISTINCT.len()],
+            DISTINCT_COLOURS[k % DISTINCT_COLOURS.len()],
             column,
             1.0,
         ))
@@ -134,7 +138,10 @@ fn ratio_panel(
     let mut series: Vec<Series> =
         channels.into_iter().enumerate().filter_map(channel_series).collect();
     if let Some(column) = map.table.column("ratio_max") {
-        series.push(Series { style: Style::Dashed, ..column_series("largest", INK, column, 1.0) });
+        series.push(Series {
+            style: SeriesStyle::Dashed,
+            ..column_series("largest", INK, column, 1.0)
+        });
     }
     let words = format!("Ratio of {}, nonlinear / linear", map.table.source.compared_quantity());
     ChartPanel {
@@ -144,7 +151,7 @@ fn ratio_panel(
             limit,
             format!("unreliable from ratio {} on", label::format_significant(limit, 4)),
         )],
-        mixed: mixed_ranges(map),
+        mixed_ranges: mixed_ranges(map),
         ..ChartPanel::new("ratio", Label::new(&words, ""), series)
     }
 }
@@ -155,8 +162,8 @@ fn mixed_ranges(map: &CellMap) -> Vec<[f64; 2]> {
     let axis = &map.grid.axes[0];
     let scale = axis.scale();
     let mut ranges: Vec<[f64; 2]> = Vec::new();
-    for (counts, ends) in map.counts.iter().zip(axis.borders.windows(2)) {
-        if counts.reliable == 0 || counts.unreliable == 0 {
+    for (counts, ends) in map.point_counts.iter().zip(axis.borders.windows(2)) {
+        if counts.reliable_points == 0 || counts.unreliable_points == 0 {
             continue;
         }
         match ranges.last_mut() {

@@ -2,7 +2,7 @@
 //! its limit.
 
 use crate::axis::{AxisScale, extremes};
-use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
+use crate::chart::{Chart, ChartPanel, Mark, Series, SeriesStyle};
 use crate::figures::matrix::side_colour;
 use crate::label::{self, Label};
 use crate::layer::DividingLimit;
@@ -12,13 +12,13 @@ use crate::scatter::{Scatter, Side};
 const MAX_HISTOGRAM_BINS: f64 = 60.0;
 
 /// Draws the histogram of a design.
-pub(crate) fn chart(scatter: &Scatter) -> Chart {
-    let bin_edges = bin_edges(scatter);
+pub(crate) fn histogram_chart(scatter: &Scatter) -> Chart {
+    let bin_edges = compute_bin_edges(scatter);
     let bin_ends: Vec<f64> = bin_edges.windows(2).flatten().copied().collect();
     let value_count = scatter.count_with_value().max(1) as f64;
     let series = [Side::Good, Side::Bad].into_iter().filter_map(|side| {
         let mut counts = vec![0_u32; bin_edges.len() - 1];
-        for (value, side_of_point) in scatter.quantity.iter().zip(&scatter.sides) {
+        for (value, side_of_point) in scatter.quantity_values.iter().zip(&scatter.sides) {
             if *side_of_point == side && value.is_finite() {
                 let bin = bin_edges[1..bin_edges.len() - 1].partition_point(|edge| edge <= value);
                 counts[bin] += 1;
@@ -27,20 +27,21 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         let percentage = |bin: usize| 100.0 * f64::from(counts[bin]) / value_count;
         // The bars of a side run from its first bin with points to its last.
         let has_points = |bin: &usize| counts[*bin] > 0;
-        let first = (0..counts.len()).find(has_points)?;
-        let last = (0..counts.len()).rfind(has_points)?;
-        let shares_at_ends = (0..counts.len()).flat_map(|bin| {
-            let is_in_range = (first..=last).contains(&bin);
+        let first_bin = (0..counts.len()).find(has_points)?;
+        let last_bin = (0..counts.len()).rfind(has_points)?;
+        let percentages_at_ends = (0..counts.len()).flat_map(|bin| {
+            let is_in_range = (first_bin..=last_bin).contains(&bin);
             [if is_in_range { percentage(bin) } else { f64::NAN }; 2]
         });
-        let y: Vec<f64> = shares_at_ends.collect();
+        let y: Vec<f64> = percentages_at_ends.collect();
         let low = y.iter().map(|percentage| 0.0 * percentage).collect();
-        let style = Style::Band(low, y.clone());
+        let style = SeriesStyle::Band(low, y.clone());
         Some(Series::new(scatter.side_meaning(side), side_colour(side), bin_ends.clone(), y, style))
     });
     let series: Vec<Series> = series.collect();
-    let greatest = extremes(series.iter().flat_map(|series| series.y.iter().copied()));
-    let y_top = greatest.map_or(100.0, |(_, greatest)| 1.06 * greatest);
+    let greatest_percentage = extremes(series.iter().flat_map(|series| series.y.iter().copied()));
+    let y_top =
+        greatest_percentage.map_or(100.0, |(_, greatest_percentage)| 1.06 * greatest_percentage);
     let limit = shown_limit(scatter);
     let mark = limit.map(|limit| Mark {
         x: limit.value,
@@ -48,12 +49,12 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
             .replace(['(', ')'], ""),
     });
     Chart {
-        title: title(scatter),
-        subtitle: scatter.subtitle(&notes(scatter)),
+        title: histogram_title(scatter),
+        subtitle: scatter.subtitle(&histogram_notes(scatter)),
         x_label: scatter.label.clone(),
         is_x_log: scatter.is_log,
         panels: vec![ChartPanel {
-            range: Some((0.0, y_top)),
+            y_range: Some((0.0, y_top)),
             ..ChartPanel::new("points", Label::new("Share of the points", "%"), series)
         }],
         mark_meaning: limit.map_or(String::new(), |limit| limit.line_name.clone()),
@@ -63,13 +64,13 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
 }
 
 /// Returns the title with the share of points on the good side.
-fn title(scatter: &Scatter) -> String {
+fn histogram_title(scatter: &Scatter) -> String {
     let words = match scatter.side_meaning(Side::Good) {
         // The words for the good side may be "reliable: below 2"; the title needs only the first.
         words if words.starts_with("reliable") => "reliable".to_owned(),
         words => format!("with {words}"),
     };
-    match scatter.share() {
+    match scatter.good_share() {
         Some(share) => {
             format!("{}: {:.1} % of the points {words}", scatter.title, 100.0 * share.fraction)
         }
@@ -78,14 +79,14 @@ fn title(scatter: &Scatter) -> String {
 }
 
 /// Returns the notes on the confidence interval of a random design and on points without a side.
-fn notes(scatter: &Scatter) -> Vec<String> {
+fn histogram_notes(scatter: &Scatter) -> Vec<String> {
     let mut notes = Vec::new();
     let is_random = scatter.source.design_method() != Some("list");
-    if let Some(share) = scatter.share().filter(|_| is_random) {
+    if let Some(share) = scatter.good_share().filter(|_| is_random) {
         let [low, high] = [share.low, share.high].map(|fraction| 100.0 * fraction);
         notes.push(format!("with 95 % confidence {low:.1} to {high:.1} % (Wilson)"));
     }
-    let [.., undefined, failed] = scatter.counts;
+    let [.., undefined, failed] = scatter.side_counts;
     for (count, word) in [(undefined, "undefined"), (failed, "failed")] {
         if count > 0 {
             notes.push(format!("{count} {word}"));
@@ -98,19 +99,20 @@ fn notes(scatter: &Scatter) -> Vec<String> {
 /// axis.
 fn shown_limit(scatter: &Scatter) -> Option<&DividingLimit> {
     let limit = scatter.limit.as_ref()?;
-    let values = scatter.quantity.iter().copied().filter(|value| !scatter.is_log || *value > 0.0);
-    let coordinate = |value: f64| if scatter.is_log { value.ln() } else { value };
-    let (low, high) = extremes(values.map(coordinate))?;
-    let span = high - low;
-    let limit_coordinate = coordinate(limit.value);
-    (low - span..=high + span).contains(&limit_coordinate).then_some(limit)
+    let values =
+        scatter.quantity_values.iter().copied().filter(|value| !scatter.is_log || *value > 0.0);
+    let to_coordinate = |value: f64| if scatter.is_log { value.ln() } else { value };
+    let (low, high) = extremes(values.map(to_coordinate))?;
+    let value_span = high - low;
+    let limit_coordinate = to_coordinate(limit.value);
+    (low - value_span..=high + value_span).contains(&limit_coordinate).then_some(limit)
 }
 
 /// Returns the edges of bins of equal width on the quantity's scale, one of them at the limit. The
 /// number of bins is twice the cube root of the number of points (Rice's rule).
-fn bin_edges(scatter: &Scatter) -> Vec<f64> {
+fn compute_bin_edges(scatter: &Scatter) -> Vec<f64> {
     let limit = shown_limit(scatter).map(|limit| limit.value);
-    let values = scatter.quantity.iter().copied().chain(limit);
+    let values = scatter.quantity_values.iter().copied().chain(limit);
     let values = values.filter(|value| !scatter.is_log || *value > 0.0);
     let (low, high) = extremes(values).unwrap_or((1.0, 2.0));
     let scale = if scatter.is_log {
@@ -122,17 +124,18 @@ fn bin_edges(scatter: &Scatter) -> Vec<f64> {
         |coordinate: f64| if scatter.is_log { coordinate.exp() } else { coordinate };
     let low = scale.coordinate(low);
     let high = scale.coordinate(high);
-    let count =
+    let bin_count =
         (2.0 * (scatter.count_with_value() as f64).cbrt()).ceil().clamp(4.0, MAX_HISTOGRAM_BINS);
-    let width = if high > low { (high - low) / count } else { low.abs().max(1.0) / count };
+    let bin_width =
+        if high > low { (high - low) / bin_count } else { low.abs().max(1.0) / bin_count };
     let origin = limit.map_or(low, |limit| scale.coordinate(limit));
-    let first = ((low - origin) / width).floor() as i64;
+    let first_edge_index = ((low - origin) / bin_width).floor() as i64;
     // The last bin must reach the greatest value.
-    let last = (((high - origin) / width).ceil() as i64).max(first + 1);
-    (first..=last)
+    let last_edge_index = (((high - origin) / bin_width).ceil() as i64).max(first_edge_index + 1);
+    (first_edge_index..=last_edge_index)
         .map(|k| match limit {
             Some(limit) if k == 0 => limit,
-            _ => from_coordinate(origin + k as f64 * width),
+            _ => from_coordinate(origin + k as f64 * bin_width),
         })
         .collect()
 }

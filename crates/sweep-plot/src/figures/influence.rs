@@ -1,10 +1,10 @@
 //! The influence of each of a design's parameters on a quantity, as bars.
 
 use crate::axis::AxisScale;
-use crate::colour::{FAILED, GOOD_SIDE};
+use crate::colour::{FAILED_COLOUR, GOOD_SIDE_COLOUR};
 use crate::frame::{
     BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
-    draw_heading, draw_legend, legend_height,
+    draw_heading, draw_legend, measure_legend_height,
 };
 use crate::influence::chance_correlation;
 use crate::label;
@@ -27,25 +27,25 @@ const MAX_BARS: usize = 24;
 const OUTLINE_MEANING: &str = "rising and falling alike (root of the correlation ratio)";
 
 /// The text in a panel without bars.
-const NO_INFLUENCE: &str = "no two points have values that differ";
+const NO_INFLUENCE_TEXT: &str = "no two points have values that differ";
 
 /// The colour of correlations that may be chance.
-const CHANCE_COLOUR: Colour = FAILED.with_alpha(110);
+const CHANCE_COLOUR: Colour = FAILED_COLOUR.with_alpha(110);
 
 /// Draws a bar for each parameter, the most influential on top.
-pub(crate) fn draw(scatter: &Scatter) -> Scene {
-    let mut indices = scatter.by_influence();
+pub(crate) fn draw_influence(scatter: &Scatter) -> Scene {
+    let mut indices = scatter.indices_by_influence();
     indices.truncate(MAX_BARS);
-    let name = |k: usize| scatter.parameters[k].label.words.clone();
-    let name_widths = indices.iter().map(|&k| text_width(&name(k), LABEL_SIZE, false));
-    let left = name_widths.fold(80.0, f64::max).min(320.0) + 40.0;
-    let entries = [
-        (LegendSymbol::Area(GOOD_SIDE), "rank correlation".to_owned()),
-        (LegendSymbol::Line(Stroke::solid(INK, 1.6)), OUTLINE_MEANING.to_owned()),
+    let parameter_name = |k: usize| scatter.parameters[k].label.words.clone();
+    let name_widths = indices.iter().map(|&k| text_width(&parameter_name(k), LABEL_SIZE, false));
+    let left_margin = name_widths.fold(80.0, f64::max).min(320.0) + 40.0;
+    let legend_entries = [
+        (LegendSymbol::Area(GOOD_SIDE_COLOUR), "rank correlation".to_owned()),
+        (LegendSymbol::Line(Stroke::new_solid(INK, 1.6)), OUTLINE_MEANING.to_owned()),
         (LegendSymbol::Area(CHANCE_COLOUR), "may be chance (95 %)".to_owned()),
     ];
-    let panel_width = FIGURE_WIDTH - left - RIGHT_MARGIN;
-    let legend_height = legend_height(&entries, FIGURE_WIDTH - 60.0);
+    let panel_width = FIGURE_WIDTH - left_margin - RIGHT_MARGIN;
+    let legend_height = measure_legend_height(&legend_entries, FIGURE_WIDTH - 60.0);
     let height = ROW_HEIGHT * indices.len() as f64 + 12.0;
     let total_height = HEADING_HEIGHT + height + BOTTOM_MARGIN + legend_height + 8.0;
     let channel = match scatter.channel.as_str() {
@@ -56,7 +56,7 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let value_count = scatter.count_with_value();
     let parameter_count = scatter.parameters.len();
     let mut notes = Vec::new();
-    if value_count < scatter.points.len() {
+    if value_count < scatter.point_rows.len() {
         notes.push(format!("{value_count} with a value"));
     }
     if parameter_count > MAX_BARS {
@@ -66,7 +66,7 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let mut scene = Scene::new(FIGURE_WIDTH, total_height, format!("{title}. {subtitle}"));
     draw_heading(&mut scene, &title, &subtitle);
     let panel = Panel {
-        x: left,
+        x: left_margin,
         y: HEADING_HEIGHT,
         width: panel_width,
         height,
@@ -78,48 +78,56 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let fill_range =
         |scene: &mut Scene, from: f64, to: f64, y: f64, height: f64, colour: Colour| {
             let [from, to] = [from.min(to), from.max(to)].map(|x| panel.x_pixel(x));
-            scene.fill(Outline::rectangle(from, y, to - from, height), colour);
+            scene.fill_outline(Outline::rectangle(from, y, to - from, height), colour);
         };
     let chance_limit = chance_correlation(value_count);
     fill_range(&mut scene, -chance_limit, chance_limit, panel.y, height, CHANCE_COLOUR);
     let zero_x = panel.x_pixel(0.0);
-    let axis = Outline::line(&[[zero_x, panel.y], [zero_x, panel.y + height]]);
-    scene.line(axis, Stroke::solid(INK, 1.2));
+    let zero_line = Outline::line(&[[zero_x, panel.y], [zero_x, panel.y + height]]);
+    scene.draw_line(zero_line, Stroke::new_solid(INK, 1.2));
     for (row, &k) in indices.iter().enumerate() {
-        let centre = panel.y + 6.0 + ROW_HEIGHT * (row as f64 + 0.5);
-        let text = Text::new(name(k), [left - 12.0, centre + 0.35 * LABEL_SIZE], LABEL_SIZE);
-        scene.text(text.anchor(Anchor::End));
+        let row_centre_y = panel.y + 6.0 + ROW_HEIGHT * (row as f64 + 0.5);
+        let text = Text::new(
+            parameter_name(k),
+            [left_margin - 12.0, row_centre_y + 0.35 * LABEL_SIZE],
+            LABEL_SIZE,
+        );
+        scene.draw_text(text.with_anchor(Anchor::End));
         let Some(influence) = scatter.parameters[k].influence else { continue };
         fill_range(
             &mut scene,
             0.0,
             influence.rank_correlation,
-            centre - BAR_HEIGHT / 2.0,
+            row_centre_y - BAR_HEIGHT / 2.0,
             BAR_HEIGHT,
-            GOOD_SIDE,
+            GOOD_SIDE_COLOUR,
         );
         if let Some(ratio) = influence
             .root_correlation_ratio
             .filter(|ratio| *ratio > influence.rank_correlation.abs())
         {
             let end_x = panel.x_pixel(ratio.copysign(influence.rank_correlation));
-            let from = zero_x.min(end_x);
-            let to = zero_x.max(end_x);
-            let outline =
-                Outline::rectangle(from, centre - BAR_HEIGHT / 2.0, to - from, BAR_HEIGHT);
-            scene.line(outline, Stroke::solid(INK, 1.6));
+            let left_x = zero_x.min(end_x);
+            let right_x = zero_x.max(end_x);
+            let outline = Outline::rectangle(
+                left_x,
+                row_centre_y - BAR_HEIGHT / 2.0,
+                right_x - left_x,
+                BAR_HEIGHT,
+            );
+            scene.draw_line(outline, Stroke::new_solid(INK, 1.6));
         }
-        let number = format_signed(influence.rank_correlation);
-        let position = [panel.x + panel_width + 10.0, centre + 0.35 * TICK_SIZE];
-        scene.text(Text::new(number, position, TICK_SIZE));
+        let correlation_text = format_signed(influence.rank_correlation);
+        let position = [panel.x + panel_width + 10.0, row_centre_y + 0.35 * TICK_SIZE];
+        scene.draw_text(Text::new(correlation_text, position, TICK_SIZE));
     }
     if indices.iter().all(|&k| scatter.parameters[k].influence.is_none()) {
-        panel.write_centred(&mut scene, NO_INFLUENCE);
+        panel.write_centred(&mut scene, NO_INFLUENCE_TEXT);
     }
     panel.draw_frame(&mut scene, true, false);
     panel.draw_x_label(&mut scene, "Rank correlation (Spearman)");
     let y = panel.y + height + BOTTOM_MARGIN;
-    draw_legend(&mut scene, &entries, 40.0, y, FIGURE_WIDTH - 60.0);
+    draw_legend(&mut scene, &legend_entries, 40.0, y, FIGURE_WIDTH - 60.0);
     scene
 }
 

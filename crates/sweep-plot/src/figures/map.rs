@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::axis::AxisScale;
-use crate::colour::{BOTH_SIDES, COLOUR_STEPS, DISTINCT};
-use crate::contour::{MAX_POINTS, remove_shortest, zero_lines};
+use crate::colour::{BOTH_SIDES_COLOUR, COLOUR_STEPS, DISTINCT_COLOURS};
+use crate::contour::{MAX_LINE_POINTS, remove_shortest_lines, zero_lines};
 use crate::cuts::Cuts;
 use crate::error::Result;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
     self, BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
-    draw_failed_area, draw_heading, draw_undefined_cells, failed_hatch, legend_height,
+    draw_failed_area, draw_heading, draw_undefined_cells, failed_hatch, measure_legend_height,
     sensitive_hatch,
 };
 use crate::gather::{CellMap, OK_STATUS};
@@ -34,29 +34,29 @@ const RIGHT_MARGIN: f64 = 128.0;
 ///
 /// # Errors
 /// Returns the errors of [`ShownColumn::layer`].
-pub(crate) fn draw(
+pub(crate) fn draw_map_scene(
     map: &CellMap,
     cuts: &Cuts,
     shown_column: Option<&ShownColumn>,
     overlay: Option<&Overlay>,
 ) -> Result<Scene> {
     let mut painter = match shown_column {
-        Some(shown_column) => CellPainter::by_value(map, shown_column.layer(map)?),
+        Some(shown_column) => CellPainter::by_value(map, shown_column.create_layer(map)?),
         None => CellPainter::by_status(map),
     };
     let grid = &map.grid;
 
-    let columns = match cuts.cuts.len() {
+    let panel_columns = match cuts.cuts.len() {
         1 => 1,
         2..=4 => 2,
         _ => 3,
     };
-    let rows = cuts.cuts.len().div_ceil(columns);
+    let panel_rows = cuts.cuts.len().div_ceil(panel_columns);
     let is_single = cuts.cuts.len() == 1;
     let right_margin = if painter.layer.is_some() { RIGHT_MARGIN } else { 24.0 };
     let (gap, name_height) = if is_single { (0.0, 0.0) } else { (22.0, 26.0) };
-    let width =
-        (FIGURE_WIDTH - LEFT_MARGIN - right_margin - gap * (columns - 1) as f64) / columns as f64;
+    let width = (FIGURE_WIDTH - LEFT_MARGIN - right_margin - gap * (panel_columns - 1) as f64)
+        / panel_columns as f64;
     let height = if is_single { 440.0 } else { 0.78 * width };
     painter.refine_hatches([width, height]);
     let [column_count, row_count] = [0, 1].map(|k| grid.axes[k].values.len());
@@ -64,24 +64,25 @@ pub(crate) fn draw(
         (0..column_count).flat_map(|x_index| (0..row_count).map(move |y_index| (x_index, y_index)))
     };
     let drawn_cells = cuts.cuts.iter().flat_map(|cut| {
-        positions_in_cut().map(|(x_index, y_index)| grid.cell(x_index, y_index, &cut.other_picks))
+        positions_in_cut()
+            .map(|(x_index, y_index)| grid.cell(x_index, y_index, &cut.pick_positions))
     });
     let mut legend_entries = painter.legend_entries(&drawn_cells.collect::<Vec<_>>());
-    let scales = [0, 1].map(|k| grid.axes[k].scale());
-    if let Some(overlay) = overlay.filter(|overlay| is_within(overlay, scales)) {
+    let axis_scales = [0, 1].map(|k| grid.axes[k].scale());
+    if let Some(overlay) = overlay.filter(|overlay| is_within(overlay, axis_scales)) {
         legend_entries.push((LegendSymbol::Line(overlay_stroke()), overlay.name.clone()));
     }
-    let legend_height = legend_height(&legend_entries, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
-    let panels_height = rows as f64 * (height + name_height) + gap * (rows - 1) as f64;
+    let legend_height = measure_legend_height(&legend_entries, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
+    let panels_height = panel_rows as f64 * (height + name_height) + gap * (panel_rows - 1) as f64;
     let total_height = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN + legend_height + 14.0;
 
     let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
     let description = format!("{}: {} over {}", painter.title, y_axis.label(), x_axis.label());
     let mut scene = Scene::new(FIGURE_WIDTH, total_height, description);
-    draw_heading(&mut scene, &painter.title, &subtitle(map, &cuts.notes));
+    draw_heading(&mut scene, &painter.title, &map_subtitle(map, &cuts.notes));
     for (index, cut) in cuts.cuts.iter().enumerate() {
-        let column = index % columns;
-        let row = index / columns;
+        let column = index % panel_columns;
+        let row = index / panel_columns;
         let panel = Panel {
             x: LEFT_MARGIN + column as f64 * (width + gap),
             y: HEADING_HEIGHT + name_height + row as f64 * (height + name_height + gap),
@@ -90,12 +91,18 @@ pub(crate) fn draw(
             x_scale: x_axis.scale(),
             y_scale: y_axis.scale(),
         };
-        painter.draw(&mut scene, &panel, &cut.other_picks);
+        painter.draw(&mut scene, &panel, &cut.pick_positions);
         let layer_and_limit =
             painter.layer.as_ref().and_then(|layer| Some((layer, layer.limit.as_ref()?)));
-        let max_points = MAX_POINTS / cuts.cuts.len();
+        let max_points = MAX_LINE_POINTS / cuts.cuts.len();
         let mut lines = layer_and_limit.map_or_else(Vec::new, |layer_and_limit| {
-            painter.draw_line(&mut scene, &panel, layer_and_limit, &cut.other_picks, max_points)
+            painter.draw_limit_line(
+                &mut scene,
+                &panel,
+                layer_and_limit,
+                &cut.pick_positions,
+                max_points,
+            )
         });
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
@@ -105,13 +112,22 @@ pub(crate) fn draw(
         if let Some(layer_and_limit) = layer_and_limit {
             let overlay_lines = overlay.iter().flat_map(|overlay| &overlay.lines);
             lines.extend(overlay_lines.map(|line| curve_pixels(&panel, line)));
-            painter.name_regions(&mut scene, &panel, layer_and_limit, (&cut.other_picks, &lines));
+            painter.name_regions(
+                &mut scene,
+                &panel,
+                layer_and_limit,
+                (&cut.pick_positions, &lines),
+            );
         }
-        let is_lowest = index + columns >= cuts.cuts.len();
+        let is_lowest = index + panel_columns >= cuts.cuts.len();
         panel.draw_frame(&mut scene, is_lowest, column == 0);
         if let Some(name) = &cut.name {
             let position = [panel.x + width / 2.0, panel.y - 8.0];
-            scene.text(Text::new(name.clone(), position, TICK_SIZE).bold().anchor(Anchor::Middle));
+            scene.draw_text(
+                Text::new(name.clone(), position, TICK_SIZE)
+                    .with_bold_face()
+                    .with_anchor(Anchor::Middle),
+            );
         }
         if is_lowest {
             panel.draw_x_label(&mut scene, &x_axis.label());
@@ -127,7 +143,7 @@ pub(crate) fn draw(
             22.0,
             panels_height - name_height,
         ];
-        colour_bar(&mut scene, layer, area);
+        draw_colour_bar(&mut scene, layer, area);
     }
     let legend_y = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN;
     frame::draw_legend(
@@ -142,7 +158,7 @@ pub(crate) fn draw(
 
 /// Returns the stroke of a boundary file's curve.
 fn overlay_stroke() -> Stroke {
-    Stroke { dash: vec![9.0, 5.0], ..Stroke::solid(OVERLAY_COLOUR, 3.0) }
+    Stroke { dash: vec![9.0, 5.0], ..Stroke::new_solid(OVERLAY_COLOUR, 3.0) }
 }
 
 /// Draws the curve of a boundary file as far as it lies within the panel.
@@ -152,11 +168,11 @@ fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     for line in &overlay.lines {
         isolated_points.extend(outline.add_runs(&curve_pixels(panel, line)));
     }
-    scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
-    scene.line(outline, overlay_stroke());
+    scene.draw_line(outline.clone(), Stroke::new_solid(PAPER, 5.0));
+    scene.draw_line(outline, overlay_stroke());
     for point in isolated_points {
-        scene.fill(Outline::circle(point, 4.5), PAPER);
-        scene.fill(Outline::circle(point, 3.5), OVERLAY_COLOUR);
+        scene.fill_outline(Outline::circle(point, 4.5), PAPER);
+        scene.fill_outline(Outline::circle(point, 3.5), OVERLAY_COLOUR);
     }
 }
 
@@ -182,16 +198,16 @@ fn curve_pixels(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
 
 /// Returns the subtitle: the name of the run, the number of points and of failed ones, and notes on
 /// fixed, omitted or merged values.
-pub(crate) fn subtitle(map: &CellMap, notes: &[String]) -> String {
+pub(crate) fn map_subtitle(map: &CellMap, notes: &[String]) -> String {
     let source = &map.table.source;
-    let mut parts = source.notes([format!("{} points", source.rows)]);
-    let failed = map.count_failed();
-    if failed > 0 {
-        parts.push(format!("{failed} failed"));
+    let mut phrases = source.notes([format!("{} points", source.rows)]);
+    let failed_rows = map.count_failed();
+    if failed_rows > 0 {
+        phrases.push(format!("{failed_rows} failed"));
     }
-    parts.extend(notes.iter().cloned());
-    parts.extend(map.grid.note());
-    parts.join(" · ")
+    phrases.extend(notes.iter().cloned());
+    phrases.extend(map.grid.merge_note());
+    phrases.join(" · ")
 }
 
 /// Returns the legend of all cells by a layer, or by status without one.
@@ -201,15 +217,15 @@ pub(crate) fn map_legend_entries(
 ) -> Vec<(LegendSymbol, String)> {
     let painter = layer
         .map_or_else(|| CellPainter::by_status(map), |layer| CellPainter::by_value(map, layer));
-    painter.legend_entries(&(0..map.counts.len()).collect::<Vec<_>>())
+    painter.legend_entries(&(0..map.point_counts.len()).collect::<Vec<_>>())
 }
 
 /// Returns the colour of each status.
 pub(crate) fn status_colours(map: &CellMap) -> BTreeMap<String, String> {
     let painter = CellPainter::by_status(map);
     let name_and_colour =
-        |index: usize| (painter.statuses[index].0.clone(), painter.status_colour(index).css());
-    (0..painter.statuses.len()).map(name_and_colour).collect()
+        |index: usize| (painter.status_counts[index].0.clone(), painter.status_colour(index).css());
+    (0..painter.status_counts.len()).map(name_and_colour).collect()
 }
 
 /// Returns the lines of a limit in several cuts of a map, in values of its axes, with at most
@@ -223,16 +239,16 @@ pub(crate) fn limit_lines(
     max_points: usize,
 ) -> Vec<Vec<Vec<[f64; 2]>>> {
     let [x_axis, y_axis] = [&map.grid.axes[0], &map.grid.axes[1]];
-    let lines_of_cut = |cut: usize| {
+    let cut_lines = |cut: usize| {
         zero_lines(&x_axis.coordinates(), &y_axis.coordinates(), |x, y| {
             let cell = cell(cut, x, y);
             limit.offset(if map.has_points(cell) { layer.mean_value(cell) } else { f64::NAN })
         })
     };
-    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(lines_of_cut).collect();
-    remove_shortest(&mut lines, max_points);
+    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(cut_lines).collect();
+    remove_shortest_lines(&mut lines, max_points);
     for [x, y] in lines.iter_mut().flatten().flatten() {
-        (*x, *y) = (x_axis.swept.from_coordinate(*x), y_axis.swept.from_coordinate(*y));
+        (*x, *y) = (x_axis.swept_axis.from_coordinate(*x), y_axis.swept_axis.from_coordinate(*y));
     }
     lines
 }
@@ -253,107 +269,116 @@ struct CellPainter<'a> {
     map: &'a CellMap,
     title: String,
     /// The filling of each cell; `None` if the file has no point in it.
-    fills: Vec<Option<CellFill>>,
+    cell_fills: Vec<Option<CellFill>>,
     layer: Option<Layer>,
     /// The statuses that [`CellFill::Status`] refers to, with the number of points of each.
-    statuses: Vec<(String, usize)>,
+    status_counts: Vec<(String, usize)>,
     /// The hatch of cells in which some points have no value, and that of cells with sensitive
     /// points.
     hatches: [Hatch; 2],
 }
 
 impl<'a> CellPainter<'a> {
-    fn new(map: &'a CellMap, title: String, fill: impl Fn(usize) -> CellFill) -> Self {
-        let fill = |cell: usize| map.has_points(cell).then(|| fill(cell));
-        let fills = (0..map.counts.len()).map(fill).collect();
+    fn new(map: &'a CellMap, title: String, cell_fill: impl Fn(usize) -> CellFill) -> Self {
+        let cell_fill = |cell: usize| map.has_points(cell).then(|| cell_fill(cell));
+        let cell_fills = (0..map.point_counts.len()).map(cell_fill).collect();
         let hatches = [failed_hatch(), sensitive_hatch()];
-        Self { map, title, fills, layer: None, statuses: Vec::new(), hatches }
+        Self { map, title, cell_fills, layer: None, status_counts: Vec::new(), hatches }
     }
 
     fn by_value(map: &'a CellMap, layer: Layer) -> Self {
-        let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
+        let cell_fill = |cell: usize| match (
+            layer.values[cell].is_finite(),
+            map.point_counts[cell].failed_points,
+        ) {
             (true, _) if layer.is_divided(cell) => CellFill::Both,
-            (true, _) => CellFill::Step(layer.scale.step(layer.values[cell])),
+            (true, _) => CellFill::Step(layer.scale.step_index(layer.values[cell])),
             (false, 0) => CellFill::Undefined,
             (false, _) => CellFill::Failed,
         };
-        let painter = Self::new(map, layer.title.clone(), fill);
+        let painter = Self::new(map, layer.title.clone(), cell_fill);
         Self { layer: Some(layer), ..painter }
     }
 
     fn by_status(map: &'a CellMap) -> Self {
-        let mut statuses: Vec<(String, usize)> =
-            map.statuses.iter().map(|(name, points)| (name.clone(), *points)).collect();
-        statuses.sort_by_key(|(name, _)| (name != OK_STATUS, name.clone()));
-        let fill = |cell: usize| {
+        let mut status_counts: Vec<(String, usize)> =
+            map.rows_by_status.iter().map(|(name, points)| (name.clone(), *points)).collect();
+        status_counts.sort_by_key(|(name, _)| (name != OK_STATUS, name.clone()));
+        let cell_fill = |cell: usize| {
             map.common_status(cell).map_or(CellFill::Both, |status| {
                 CellFill::Status(
-                    statuses.iter().position(|(name, _)| name == status).unwrap_or_default(),
+                    status_counts.iter().position(|(name, _)| name == status).unwrap_or_default(),
                 )
             })
         };
-        let painter = Self::new(map, "How each point ended".to_owned(), fill);
-        Self { statuses, ..painter }
+        let painter = Self::new(map, "How each point ended".to_owned(), cell_fill);
+        Self { status_counts, ..painter }
     }
 
     /// Makes hatches fine enough to be visible on the smallest cell of a panel of this size, px.
-    fn refine_hatches(&mut self, size: [f64; 2]) {
+    fn refine_hatches(&mut self, panel_size: [f64; 2]) {
         let smallest_cell = [0, 1].map(|k| {
             let axis = &self.map.grid.axes[k];
             let scale = axis.scale();
-            let extent = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
-            axis.borders.windows(2).map(extent).fold(1.0, f64::min) * size[k]
+            let cell_extent = |pair: &[f64]| scale.position(pair[1]) - scale.position(pair[0]);
+            axis.borders.windows(2).map(cell_extent).fold(1.0, f64::min) * panel_size[k]
         });
-        self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest_cell));
+        self.hatches = self.hatches.clone().map(|hatch| hatch.with_spacing_for(smallest_cell));
     }
 
     fn status_colour(&self, index: usize) -> Colour {
-        if self.statuses[index].0 == OK_STATUS {
+        if self.status_counts[index].0 == OK_STATUS {
             Colour::hex(0xe8ebee)
         } else {
-            DISTINCT[index % DISTINCT.len()]
+            DISTINCT_COLOURS[index % DISTINCT_COLOURS.len()]
         }
     }
 
     fn draw(&self, scene: &mut Scene, panel: &Panel, cut_indices: &[usize]) {
         // Cells of one colour are one shape, and runs of them along y one rectangle: the file is
         // small and has no seams.
-        let mut shapes: BTreeMap<CellFill, Outline> = BTreeMap::new();
+        let mut outlines_by_fill: BTreeMap<CellFill, Outline> = BTreeMap::new();
         let mut undefined_areas: Vec<[f64; 4]> = Vec::new();
-        let fill = |cell: usize| self.fills[cell];
-        let is_undefined = |fill| fill == Some(CellFill::Undefined);
-        for ([x, y, width, height], fill) in self.strips(panel, cut_indices, fill, is_undefined) {
-            match fill {
+        let fill_at = |cell: usize| self.cell_fills[cell];
+        let is_undefined = |fill_at| fill_at == Some(CellFill::Undefined);
+        for ([x, y, width, height], fill_at) in
+            self.strips(panel, cut_indices, fill_at, is_undefined)
+        {
+            match fill_at {
                 Some(CellFill::Undefined) => undefined_areas.push([x, y, width, height]),
-                Some(fill) => shapes.entry(fill).or_default().add_rectangle(x, y, width, height),
+                Some(fill_at) => {
+                    outlines_by_fill.entry(fill_at).or_default().add_rectangle(x, y, width, height)
+                }
                 None => {}
             }
         }
-        for (fill, shape) in shapes {
-            match (fill, &self.layer) {
+        for (fill_at, shape) in outlines_by_fill {
+            match (fill_at, &self.layer) {
                 (CellFill::Step(step), Some(layer)) => {
-                    scene.fill_crisp(shape, layer.scale.colour(step))
+                    scene.fill_crisply(shape, layer.scale.colour(step))
                 }
                 (CellFill::Status(status), _) => {
-                    scene.fill_crisp(shape, self.status_colour(status))
+                    scene.fill_crisply(shape, self.status_colour(status))
                 }
-                (CellFill::Both, _) => scene.fill_crisp(shape, BOTH_SIDES),
+                (CellFill::Both, _) => scene.fill_crisply(shape, BOTH_SIDES_COLOUR),
                 _ => draw_failed_area(scene, shape),
             }
         }
         if !undefined_areas.is_empty() {
             draw_undefined_cells(scene, &undefined_areas);
         }
-        scene.hatch(
-            self.area(panel, cut_indices, |cell| self.has_missing_values(cell)),
+        scene.fill_with_hatch(
+            self.cell_area(panel, cut_indices, |cell| self.has_missing_values(cell)),
             &self.hatches[0],
         );
-        scene
-            .hatch(self.area(panel, cut_indices, |cell| self.is_sensitive(cell)), &self.hatches[1]);
+        scene.fill_with_hatch(
+            self.cell_area(panel, cut_indices, |cell| self.is_sensitive(cell)),
+            &self.hatches[1],
+        );
     }
 
     /// Returns the outline of the cells for which `is_included` is true.
-    fn area(
+    fn cell_area(
         &self,
         panel: &Panel,
         cut_indices: &[usize],
@@ -405,7 +430,7 @@ impl<'a> CellPainter<'a> {
 
     /// Returns whether a cell has points that failed or have no value beside others with a value.
     fn has_missing_values(&self, cell: usize) -> bool {
-        matches!(self.fills[cell], Some(CellFill::Step(_) | CellFill::Both))
+        matches!(self.cell_fills[cell], Some(CellFill::Step(_) | CellFill::Both))
             && self
                 .layer
                 .as_ref()
@@ -413,17 +438,17 @@ impl<'a> CellPainter<'a> {
     }
 
     fn has_failed(&self, cell: usize) -> bool {
-        self.map.counts[cell].failed > 0
+        self.map.point_counts[cell].failed_points > 0
     }
 
     /// Returns whether a cell's colour depends on a chaotic motion.
     fn is_sensitive(&self, cell: usize) -> bool {
         self.layer.as_ref().is_some_and(|layer| layer.is_nonlinear)
-            && self.map.counts[cell].sensitive > 0
+            && self.map.point_counts[cell].sensitive_points > 0
     }
 
     /// Draws the lines of the limit with at most `max_points` points. Returns their points, px.
-    fn draw_line(
+    fn draw_limit_line(
         &self,
         scene: &mut Scene,
         panel: &Panel,
@@ -441,8 +466,8 @@ impl<'a> CellPainter<'a> {
             points.into_iter().map(Some).collect()
         });
         let lines = lines.collect();
-        scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
-        scene.line(outline, Stroke::solid(INK, 2.6));
+        scene.draw_line(outline.clone(), Stroke::new_solid(PAPER, 5.0));
+        scene.draw_line(outline, Stroke::new_solid(INK, 2.6));
         lines
     }
 
@@ -458,7 +483,7 @@ impl<'a> CellPainter<'a> {
             index.clamp(1, axis.borders.len() - 1) - 1
         };
         let axes = &self.map.grid.axes;
-        let offset = |[x, y]: [f64; 2]| {
+        let limit_offset = |[x, y]: [f64; 2]| {
             let x = cell_index_at(&axes[0], panel.x_scale, x / panel.width);
             let y = cell_index_at(&axes[1], panel.y_scale, 1.0 - y / panel.height);
             let cell = self.map.cell(x, y, cut_indices).filter(|&cell| !layer.is_divided(cell));
@@ -469,19 +494,21 @@ impl<'a> CellPainter<'a> {
         {
             // A cell without a value lies on neither side.
             let is_inside = |point: [f64; 2]| {
-                let offset = offset(point);
-                offset.is_finite() && (offset >= 0.0) == wanted_above
+                let limit_offset = limit_offset(point);
+                limit_offset.is_finite() && (limit_offset >= 0.0) == wanted_above
             };
-            let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
-            let area = [panel.width, panel.height];
+            let name_size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
+            let panel_size = [panel.width, panel.height];
             // A name is kept away from the lines if there is room.
             let is_clear = |point: [f64; 2]| is_inside(point) && !is_near_line(panel, lines, point);
-            let name_position = roomiest_position(area, size, is_clear)
-                .or_else(|| roomiest_position(area, size, is_inside));
+            let name_position = roomiest_position(panel_size, name_size, is_clear)
+                .or_else(|| roomiest_position(panel_size, name_size, is_inside));
             if let Some([x, y]) = name_position {
                 let position = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
-                let text = Text::new(name, position, LABEL_SIZE).bold().anchor(Anchor::Middle);
-                scene.text(Text { halo: Some(PAPER), ..text });
+                let text = Text::new(name, position, LABEL_SIZE)
+                    .with_bold_face()
+                    .with_anchor(Anchor::Middle);
+                scene.draw_text(Text { halo: Some(PAPER), ..text });
             }
         }
     }
@@ -491,37 +518,45 @@ impl<'a> CellPainter<'a> {
         let mut entries = Vec::new();
         let is_any_drawn =
             |condition: &dyn Fn(usize) -> bool| drawn_cells.iter().any(|&cell| condition(cell));
-        let is_fill_drawn = |fill: CellFill| is_any_drawn(&|cell| self.fills[cell] == Some(fill));
+        let is_fill_drawn =
+            |fill: CellFill| is_any_drawn(&|cell| self.cell_fills[cell] == Some(fill));
         if let Some(Layer { limit: Some(limit), scale, .. }) = &self.layer {
             let colour_at_quarter = |quarters: usize| scale.colour(quarters * COLOUR_STEPS / 4);
             // Cells whose points are all on one side have no line between them.
-            let offset = |cell: usize| {
+            let limit_offset = |cell: usize| {
                 self.layer.as_ref().map_or(f64::NAN, |layer| limit.offset(layer.mean_value(cell)))
             };
-            if is_any_drawn(&|cell| offset(cell) >= 0.0) && is_any_drawn(&|cell| offset(cell) < 0.0)
+            if is_any_drawn(&|cell| limit_offset(cell) >= 0.0)
+                && is_any_drawn(&|cell| limit_offset(cell) < 0.0)
             {
-                entries
-                    .push((LegendSymbol::Line(Stroke::solid(INK, 2.6)), limit.line_name.clone()));
+                entries.push((
+                    LegendSymbol::Line(Stroke::new_solid(INK, 2.6)),
+                    limit.line_name.clone(),
+                ));
             }
             entries
                 .push((LegendSymbol::Area(colour_at_quarter(3)), limit.above_meanings[1].clone()));
             entries
                 .push((LegendSymbol::Area(colour_at_quarter(1)), limit.below_meanings[1].clone()));
             if is_fill_drawn(CellFill::Both) {
-                entries.push((LegendSymbol::Area(BOTH_SIDES), limit.both_meaning.clone()));
+                entries.push((LegendSymbol::Area(BOTH_SIDES_COLOUR), limit.both_meaning.clone()));
             }
         }
-        for (index, (name, points)) in self.statuses.iter().enumerate() {
+        for (index, (name, points)) in self.status_counts.iter().enumerate() {
             let text = format!("{} ({points})", name.replace('_', " "));
             entries.push((LegendSymbol::Area(self.status_colour(index)), text));
         }
         if self.layer.is_none() && is_fill_drawn(CellFill::Both) {
-            entries.push((LegendSymbol::Area(BOTH_SIDES), "points of several kinds".to_owned()));
+            entries.push((
+                LegendSymbol::Area(BOTH_SIDES_COLOUR),
+                "points of several kinds".to_owned(),
+            ));
         }
-        let has_only_failed =
-            |cell: usize| self.map.counts[cell].failed == self.map.counts[cell].points;
+        let has_only_failed = |cell: usize| {
+            self.map.point_counts[cell].failed_points == self.map.point_counts[cell].points
+        };
         if is_any_drawn(&|cell| {
-            self.fills[cell] == Some(CellFill::Failed) && !has_only_failed(cell)
+            self.cell_fills[cell] == Some(CellFill::Failed) && !has_only_failed(cell)
         }) {
             entries.push((LegendSymbol::Failed, "no result: failed or undefined".to_owned()));
         } else if is_fill_drawn(CellFill::Failed) {
@@ -561,7 +596,7 @@ impl<'a> CellPainter<'a> {
 fn is_near_line(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
     let point = [panel.x + x, panel.y + y];
     let max_distance = (panel.width / 44.0).max(panel.height / 33.0);
-    let is_close = |from: [f64; 2], to: [f64; 2]| {
+    let is_near_segment = |from: [f64; 2], to: [f64; 2]| {
         let [[dx, px], [dy, py]] = [0, 1].map(|k| [to[k] - from[k], point[k] - from[k]]);
         let squared_length = (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
         let fraction = ((px * dx + py * dy) / squared_length).clamp(0.0, 1.0);
@@ -569,30 +604,35 @@ fn is_near_line(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]
     };
     let pairs = lines.iter().flat_map(|line| line.windows(2));
     let mut segments = pairs.filter_map(|pair| pair[0].zip(pair[1]));
-    segments.any(|(from, to)| is_close(from, to))
+    segments.any(|(from, to)| is_near_segment(from, to))
 }
 
-fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {
+fn draw_colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {
     let step_height = height / COLOUR_STEPS as f64;
     for step in 0..COLOUR_STEPS {
-        let top = y + height - (step + 1) as f64 * step_height;
-        scene.fill_crisp(Outline::rectangle(x, top, width, step_height), layer.scale.colour(step));
+        let step_top = y + height - (step + 1) as f64 * step_height;
+        scene.fill_crisply(
+            Outline::rectangle(x, step_top, width, step_height),
+            layer.scale.colour(step),
+        );
     }
-    scene.line(Outline::rectangle(x, y, width, height), Stroke::solid(INK, 1.2));
+    scene.draw_line(Outline::rectangle(x, y, width, height), Stroke::new_solid(INK, 1.2));
     let mut marks = Outline::default();
     for tick in layer.scale.ticks() {
         let tick_y = y + (1.0 - layer.scale.position(tick.value)) * height;
         marks.add_line(&[[x + width, tick_y], [x + width + 5.0, tick_y]]);
         let is_centre = layer.scale.centre == Some(tick.value);
         let text = Text::new(tick.label, [x + width + 8.0, tick_y + 0.35 * TICK_SIZE], TICK_SIZE);
-        scene.text(if is_centre { text.bold() } else { text });
+        scene.draw_text(if is_centre { text.with_bold_face() } else { text });
         if is_centre {
             marks.add_line(&[[x, tick_y], [x + width, tick_y]]);
         }
     }
-    scene.line(marks, Stroke::solid(INK, 1.4));
+    scene.draw_line(marks, Stroke::new_solid(INK, 1.4));
     let label_position = [x + width + 72.0, y + height / 2.0];
-    scene.text(
-        Text::new(layer.label.clone(), label_position, TICK_SIZE).anchor(Anchor::Middle).rotated(),
+    scene.draw_text(
+        Text::new(layer.label.clone(), label_position, TICK_SIZE)
+            .with_anchor(Anchor::Middle)
+            .with_rotation(),
     );
 }

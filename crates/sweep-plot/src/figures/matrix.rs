@@ -3,16 +3,16 @@
 
 use crate::axis::{AxisScale, extremes};
 use crate::chart::level_stroke;
-use crate::colour::{BAD_SIDE, GOOD_SIDE};
+use crate::colour::{BAD_SIDE_COLOUR, GOOD_SIDE_COLOUR};
 use crate::frame::{
     BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, draw_heading,
-    draw_legend, legend_height,
+    draw_legend, measure_legend_height,
 };
 use crate::label::Label;
 use crate::layer::DividingLimit;
 use crate::raster::text_width;
 use crate::scatter::{Scatter, Side};
-use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
+use crate::scene::{Colour, INK, MUTED_COLOUR, Outline, Scene, Stroke};
 
 /// Maximum number of parameters shown. Basis: with more, panels are too small to read.
 pub(crate) const MAX_MATRIX_PARAMETERS: usize = 5;
@@ -40,40 +40,40 @@ pub(crate) struct MatrixAxis<'a> {
 
 /// Returns the indices of the parameters shown in file order: all, or the most influential.
 pub(crate) fn shown_parameters(scatter: &Scatter) -> Vec<usize> {
-    let mut indices = scatter.by_influence();
+    let mut indices = scatter.indices_by_influence();
     indices.truncate(MAX_MATRIX_PARAMETERS);
     indices.sort_unstable();
     indices
 }
 
 /// Returns the notes on parameters and points that are left out.
-pub(crate) fn notes(scatter: &Scatter) -> Vec<String> {
+pub(crate) fn matrix_notes(scatter: &Scatter) -> Vec<String> {
     let parameter_count = scatter.parameters.len();
     let shown_count = shown_parameters(scatter).len();
     let mut notes = Vec::new();
     if shown_count < parameter_count {
         notes.push(format!("the {shown_count} most influential of {parameter_count} parameters"));
     }
-    let drawn_count = drawn_points(scatter).len();
-    if drawn_count < scatter.points.len() {
+    let drawn_count = drawn_point_indices(scatter).len();
+    if drawn_count < scatter.point_rows.len() {
         notes.push(format!("{drawn_count} drawn"));
     }
     notes
 }
 
 /// Returns the indices of the points drawn.
-pub(crate) fn drawn_points(scatter: &Scatter) -> Vec<usize> {
-    let stride = scatter.points.len().div_ceil(MAX_DRAWN_POINTS).max(1);
+pub(crate) fn drawn_point_indices(scatter: &Scatter) -> Vec<usize> {
+    let stride = scatter.point_rows.len().div_ceil(MAX_DRAWN_POINTS).max(1);
     scatter.pick_points(stride)
 }
 
 /// Returns the scale of some values, with a margin for the dots at its ends.
 pub(crate) fn scale_with_margin(values: &[f64], is_log: bool) -> AxisScale {
     if !is_log {
-        return AxisScale::around(values.iter().copied());
+        return AxisScale::around_values(values.iter().copied());
     }
-    let positive = values.iter().copied().filter(|value| *value > 0.0);
-    let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
+    let positive_values = values.iter().copied().filter(|value| *value > 0.0);
+    let (low, high) = extremes(positive_values).unwrap_or((1.0, 10.0));
     let margin_factor = (high / low).powf(0.05).max(1.02);
     AxisScale::logarithmic(low / margin_factor, high * margin_factor)
 }
@@ -84,8 +84,12 @@ pub(crate) fn matrix_axes(scatter: &Scatter) -> Vec<MatrixAxis<'_>> {
     let parameters = parameters.map(|parameter| {
         (&parameter.name[..], &parameter.label, &parameter.values[..], parameter.is_log)
     });
-    let parameters_and_quantity =
-        parameters.chain([("", &scatter.short_label, &scatter.quantity[..], scatter.is_log)]);
+    let parameters_and_quantity = parameters.chain([(
+        "",
+        &scatter.short_label,
+        &scatter.quantity_values[..],
+        scatter.is_log,
+    )]);
     let matrix_axis = |(name, label, values, is_log)| {
         let scale = scale_with_margin(values, is_log);
         MatrixAxis { name, label, values, scale }
@@ -98,32 +102,33 @@ pub(crate) fn matrix_axes(scatter: &Scatter) -> Vec<MatrixAxis<'_>> {
 pub(crate) type PanelPositions = Vec<(usize, usize, f64, f64, f64, f64)>;
 
 /// Draws the matrix: every pair of parameters below its diagonal, and the quantity in its last row.
-pub(crate) fn draw(scatter: &Scatter) -> (Scene, PanelPositions) {
+pub(crate) fn draw_matrix(scatter: &Scatter) -> (Scene, PanelPositions) {
     let axes = matrix_axes(scatter);
     let parameters = &axes[..axes.len() - 1];
-    let count = parameters.len();
+    let parameter_count = parameters.len();
     let width =
-        (FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - PANEL_GAP * (count - 1) as f64) / count as f64;
+        (FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - PANEL_GAP * (parameter_count - 1) as f64)
+            / parameter_count as f64;
     let height = (0.8 * width).clamp(130.0, MAX_PANEL_HEIGHT);
     let legend_entries = legend_entries(scatter);
     let legend_width = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
-    let legend_height = legend_height(&legend_entries, legend_width);
+    let legend_height = measure_legend_height(&legend_entries, legend_width);
     let label_lines = parameters.iter().map(|axis| wrap_label(axis.label, width).len()).max();
     let space_below =
         BOTTOM_MARGIN + 1.2 * LABEL_SIZE * label_lines.unwrap_or(1).saturating_sub(1) as f64;
-    let panels_height = count as f64 * (height + PANEL_GAP) - PANEL_GAP;
+    let panels_height = parameter_count as f64 * (height + PANEL_GAP) - PANEL_GAP;
     let total_height = HEADING_HEIGHT + panels_height + space_below + legend_height + 8.0;
     let title = &scatter.title;
-    let subtitle = scatter.subtitle(&notes(scatter));
+    let subtitle = scatter.subtitle(&matrix_notes(scatter));
     let mut scene = Scene::new(FIGURE_WIDTH, total_height, format!("{title}. {subtitle}"));
     draw_heading(&mut scene, title, &subtitle);
     let dots = Dots::new(scatter, width);
     let mut positions = PanelPositions::new();
-    for row in 0..count {
-        let is_last_row = row + 1 == count;
+    for row in 0..parameter_count {
+        let is_last_row = row + 1 == parameter_count;
         let y = &axes[row + 1];
         for (column, x) in
-            parameters.iter().enumerate().take(if is_last_row { count } else { row + 1 })
+            parameters.iter().enumerate().take(if is_last_row { parameter_count } else { row + 1 })
         {
             let panel = Panel {
                 x: LEFT_MARGIN + column as f64 * (width + PANEL_GAP),
@@ -135,11 +140,11 @@ pub(crate) fn draw(scatter: &Scatter) -> (Scene, PanelPositions) {
             };
             positions.push((column, row + 1, panel.x, panel.y, width, height));
             panel.draw_grid_lines(&mut scene);
-            scene.clipped(panel.outline(), |scene| {
+            scene.draw_clipped(panel.outline(), |scene| {
                 if let (true, Some(limit)) = (is_last_row, &scatter.limit) {
                     let limit_y = panel.y_pixel(limit.value);
                     let line = Outline::line(&[[panel.x, limit_y], [panel.x + width, limit_y]]);
-                    scene.line(line, level_stroke());
+                    scene.draw_line(line, level_stroke());
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
@@ -176,17 +181,17 @@ fn wrap_label(label: &Label, width: f64) -> Vec<String> {
 
 fn draw_x_label(scene: &mut Scene, panel: &Panel, label: &Label) {
     for (k, line) in wrap_label(label, panel.width).iter().enumerate() {
-        let below = Panel { y: panel.y + 1.2 * LABEL_SIZE * k as f64, ..panel.clone() };
-        below.draw_x_label(scene, line);
+        let panel_below = Panel { y: panel.y + 1.2 * LABEL_SIZE * k as f64, ..panel.clone() };
+        panel_below.draw_x_label(scene, line);
     }
 }
 
 /// Returns the colour of a side.
 pub(crate) const fn side_colour(side: Side) -> Colour {
     match side {
-        Side::Good => GOOD_SIDE,
-        Side::Bad => BAD_SIDE,
-        Side::Undefined => MUTED,
+        Side::Good => GOOD_SIDE_COLOUR,
+        Side::Bad => BAD_SIDE_COLOUR,
+        Side::Undefined => MUTED_COLOUR,
         Side::Failed => INK,
     }
 }
@@ -201,10 +206,11 @@ struct Dots {
 
 impl Dots {
     fn new(scatter: &Scatter, width: f64) -> Self {
-        let indices = drawn_points(scatter);
-        let points_on =
+        let indices = drawn_point_indices(scatter);
+        let points_on_side =
             |side: Side| indices.iter().copied().filter(|&k| scatter.sides[k] == side).collect();
-        let indices_by_side = Side::ALL.into_iter().map(|side| (side, points_on(side))).collect();
+        let indices_by_side =
+            Side::ALL.into_iter().map(|side| (side, points_on_side(side))).collect();
         // Dots cover a quarter of the panel's area at most.
         let radius = (0.25 * width / (indices.len().max(1) as f64).sqrt()).clamp(1.1, 3.4);
         Self { indices_by_side, radius }
@@ -230,9 +236,11 @@ impl Dots {
                 continue;
             }
             match side {
-                Side::Good | Side::Bad => scene.fill(outline, side_colour(*side).with_alpha(210)),
+                Side::Good | Side::Bad => {
+                    scene.fill_outline(outline, side_colour(*side).with_alpha(210))
+                }
                 Side::Undefined | Side::Failed => {
-                    scene.line(outline, Stroke::solid(side_colour(*side), 1.2));
+                    scene.draw_line(outline, Stroke::new_solid(side_colour(*side), 1.2));
                 }
             }
         }
@@ -243,17 +251,17 @@ impl Dots {
 fn add_dot(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     match side {
         Side::Good | Side::Undefined => {
-            let near = 0.414 * radius;
-            let far = radius;
+            let near_offset = 0.414 * radius;
+            let far_offset = radius;
             let corners = [
-                [near, far],
-                [far, near],
-                [far, -near],
-                [near, -far],
-                [-near, -far],
-                [-far, -near],
-                [-far, near],
-                [-near, far],
+                [near_offset, far_offset],
+                [far_offset, near_offset],
+                [far_offset, -near_offset],
+                [near_offset, -far_offset],
+                [-near_offset, -far_offset],
+                [-far_offset, -near_offset],
+                [-far_offset, near_offset],
+                [-near_offset, far_offset],
             ];
             outline.add_polygon(&corners.map(|[dx, dy]| [x + dx, y + dy]));
         }
@@ -282,14 +290,15 @@ fn add_dot(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
 
 fn legend_entries(scatter: &Scatter) -> Vec<(LegendSymbol, String)> {
     let mut entries = Vec::new();
-    for (side, count) in Side::ALL.into_iter().zip(scatter.counts) {
+    for (side, count) in Side::ALL.into_iter().zip(scatter.side_counts) {
         if count > 0 {
             let words = format!("{} ({count})", scatter.side_meaning(side));
             entries.push((side_symbol(side), words));
         }
     }
-    let quantity = scale_with_margin(&scatter.quantity, scatter.is_log);
-    let is_drawn = |limit: &&DividingLimit| (0.0..=1.0).contains(&quantity.position(limit.value));
+    let quantity_scale = scale_with_margin(&scatter.quantity_values, scatter.is_log);
+    let is_drawn =
+        |limit: &&DividingLimit| (0.0..=1.0).contains(&quantity_scale.position(limit.value));
     if let Some(limit) = scatter.limit.as_ref().filter(is_drawn) {
         entries.push((LegendSymbol::Line(level_stroke()), limit.line_name.clone()));
     }

@@ -1,8 +1,8 @@
 //! The figure of a study: its candidates with the other objectives over the first and the Pareto
 //! front, or its single objective over the number of the candidate.
 
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::{DISTINCT, FAILED, NONLINEAR};
+use crate::chart::{Chart, ChartPanel, Series, SeriesStyle};
+use crate::colour::{DISTINCT_COLOURS, FAILED_COLOUR, NONLINEAR_COLOUR};
 use crate::error::Result;
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, FigureFile};
@@ -19,7 +19,7 @@ fn with_name_in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
 ///
 /// # Errors
 /// A file without objectives.
-pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
+pub(crate) fn study_chart(source: &FigureFile) -> Result<Chart> {
     // The study's expressions are clearer than column names, which lack quantiles.
     let objectives: Vec<(&ColumnFacts, String)> = source
         .metadata_list("objective")
@@ -29,17 +29,18 @@ pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
         })
         .collect();
     let [first_objective, further_objectives @ ..] = objectives.as_slice() else {
-        return Err(source.missing_column("an objective", "written by `sweep optimise`"));
+        return Err(source.missing_column_error("an objective", "written by `sweep optimise`"));
     };
     let candidate_column = source
         .column("candidate")
-        .ok_or_else(|| source.missing_column("candidate", "its index"))?;
+        .ok_or_else(|| source.missing_column_error("candidate", "its index"))?;
     let (x_column, y_objectives) = match further_objectives {
         [] => (with_name_in_words(candidate_column), &objectives[..]),
         _ => (first_objective.clone(), further_objectives),
     };
     // Parameters stand between the generation and the first objective.
-    let parameters = source.numeric().skip_while(|column| column.name != "generation").skip(1);
+    let parameters =
+        source.number_columns().skip_while(|column| column.name != "generation").skip(1);
     let parameters = parameters
         .take_while(|column| column.name != first_objective.0.name)
         .map(with_name_in_words);
@@ -58,29 +59,31 @@ pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
         .chain(&y_columns)
         .map(|(column, _)| label::display_unit(column.unit()))
         .collect();
-    let values = |kind: usize, k: usize| -> Vec<f64> {
-        let candidates_of_kind = candidates.iter().filter(|(kind_of_candidate, values)| {
-            *kind_of_candidate == kind && values[0].is_finite()
-        });
-        candidates_of_kind.map(|(_, values)| values[k] * units[k].1).collect()
+    let candidate_values = |kind: usize, k: usize| -> Vec<f64> {
+        let candidates_of_kind =
+            candidates.iter().filter(|(kind_of_candidate, candidate_values)| {
+                *kind_of_candidate == kind && candidate_values[0].is_finite()
+            });
+        candidates_of_kind.map(|(_, candidate_values)| candidate_values[k] * units[k].1).collect()
     };
     let panels = y_columns.iter().enumerate().map(|(k, (column, words))| {
-        let colours = [FAILED, DISTINCT[5], NONLINEAR];
-        let dots = |kind: usize| {
+        let colours = [FAILED_COLOUR, DISTINCT_COLOURS[5], NONLINEAR_COLOUR];
+        let kind_series = |kind: usize| {
             Series::new(
                 CANDIDATE_KINDS[kind],
                 colours[kind],
-                values(kind, 0),
-                values(kind, k + 1),
-                Style::Dots,
+                candidate_values(kind, 0),
+                candidate_values(kind, k + 1),
+                SeriesStyle::Dots,
             )
         };
-        let dots = (0..CANDIDATE_KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
+        let kind_series =
+            (0..CANDIDATE_KINDS.len()).map(kind_series).filter(|series| !series.x.is_empty());
         let label = Label::new(words, units[k + 1].0);
         ChartPanel {
             is_shown: k < y_objectives.len(),
             height: 300.0,
-            ..ChartPanel::new(&column.name, label, dots.collect())
+            ..ChartPanel::new(&column.name, label, kind_series.collect())
         }
     });
     Ok(Chart {

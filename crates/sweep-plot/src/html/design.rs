@@ -15,23 +15,23 @@ use crate::{DesignView, PlotOptions, svg};
 /// Writes the page, which opens with the figure that the options name.
 pub(crate) fn design_page(scatter: &Scatter, options: &PlotOptions, model: &dyn Figures) -> String {
     let title = &scatter.title;
-    let drawn_points = matrix::drawn_points(scatter);
-    let chart = histogram::chart(scatter);
-    let encode_drawn =
+    let drawn_points = matrix::drawn_point_indices(scatter);
+    let chart = histogram::histogram_chart(scatter);
+    let encode_drawn_points =
         |values: &[f64]| embed::encode_floats(drawn_points.iter().map(|&k| values[k]));
     let axis_json = |axis: &matrix::MatrixAxis<'_>| {
         json!({
             "name": axis.name,
             "words": axis.label.words,
             "unit": axis.label.unit,
-            "values": encode_drawn(axis.values),
+            "values": encode_drawn_points(axis.values),
             "log": axis.scale.is_log,
             "range": [axis.scale.from, axis.scale.to],
         })
     };
-    let (picture, panels) = matrix::draw(scatter);
+    let (picture, panels) = matrix::draw_matrix(scatter);
     let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
-    let sides = Side::ALL.map(|side| scatter.side_meaning(side));
+    let side_meanings = Side::ALL.map(|side| scatter.side_meaning(side));
     let data = json!({
         "kind": "design",
         "title": title,
@@ -42,21 +42,21 @@ pub(crate) fn design_page(scatter: &Scatter, options: &PlotOptions, model: &dyn 
             _ => "scatter",
         },
         "scatter": {
-            "picture": svg::write(&picture),
+            "picture": svg::write_svg(&picture),
             "view": [0.0, top, width, height],
             "panels": panels,
             "directions": matrix::matrix_axes(scatter).iter().map(axis_json).collect::<Value>(),
-            "points": drawn_points.iter().map(|&k| scatter.points[k]).collect::<Value>(),
+            "points": drawn_points.iter().map(|&k| scatter.point_rows[k]).collect::<Value>(),
             "of": drawn_points.iter().map(|&k| scatter.sides[k] as usize).collect::<Value>(),
-            "sides": sides,
-            "note": matrix::notes(scatter).join("; "),
+            "sides": side_meanings,
+            "note": matrix::matrix_notes(scatter).join("; "),
         },
         "histogram": {
             "title": chart.title,
             "subtitle": chart.subtitle,
             "chart": chart_json(&chart, encode_curve),
         },
-        "influence": svg::write(&influence::draw(scatter)),
+        "influence": svg::write_svg(&influence::draw_influence(scatter)),
     });
     let axes: Vec<(&str, bool)> = scatter
         .parameters

@@ -29,14 +29,14 @@ pub fn encode_bits(values: &[bool]) -> String {
 /// Encodes values as little-endian 16-bit integers in base64, and returns the value of one unit:
 /// 1/32767 of the peak. A value that is not finite becomes the least integer.
 pub fn quantise(values: &[f64]) -> (String, f64) {
-    let finite = values.iter().filter(|value| value.is_finite());
-    let peak = finite.fold(0.0_f64, |peak, value| peak.max(value.abs()));
-    let unit =
+    let finite_values = values.iter().filter(|value| value.is_finite());
+    let peak = finite_values.fold(0.0_f64, |peak, value| peak.max(value.abs()));
+    let quantum =
         round_to_six_digits(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
     let to_integer =
-        |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };
+        |value: &f64| if value.is_finite() { (value / quantum).round() as i16 } else { i16::MIN };
     let data = values.iter().flat_map(|value| to_integer(value).to_le_bytes()).collect::<Vec<u8>>();
-    (STANDARD.encode(data), unit)
+    (STANDARD.encode(data), quantum)
 }
 
 /// Rounds a number to six digits, so that it is written short.

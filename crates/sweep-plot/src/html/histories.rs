@@ -80,13 +80,16 @@ pub(crate) fn read_histories(folder: &Path, map: &CellMap, model: &dyn Figures) 
 fn find_cell(trace: &FigureFile, point_of_trace: &NamedPoint, map: &CellMap) -> Option<usize> {
     // A file whose metadata give its point belongs to that point only, whatever its name.
     if !point_of_trace.is_empty() {
-        let value_of_axis = |name: &str| {
+        let find_axis_value = |name: &str| {
             point_of_trace.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
         };
-        let cells_of_axes =
-            map.grid.axes.iter().map(|axis| axis.cell_index_near(value_of_axis(&axis.swept.name)?));
+        let cells_of_axes = map
+            .grid
+            .axes
+            .iter()
+            .map(|axis| axis.cell_index_near(find_axis_value(&axis.swept_axis.name)?));
         let cells_of_axes: Vec<usize> = cells_of_axes.collect::<Option<_>>()?;
-        return Some(map.grid.index(cells_of_axes)).filter(|&cell| map.has_points(cell));
+        return Some(map.grid.flat_index(cells_of_axes)).filter(|&cell| map.has_points(cell));
     }
     let stem = trace.path.file_stem()?.to_str()?;
     let digits = stem.rsplit(|letter: char| !letter.is_ascii_digit()).next()?;
@@ -99,10 +102,10 @@ fn map_point(point_of_trace: &NamedPoint, cell: usize, map: &CellMap) -> NamedPo
     let mut remaining = cell;
     let mut point = NamedPoint::new();
     for axis in map.grid.axes.iter().rev() {
-        let axis_value = point_of_trace.iter().find(|(name, _)| *name == axis.swept.name);
+        let axis_value = point_of_trace.iter().find(|(name, _)| *name == axis.swept_axis.name);
         let value =
             axis_value.map_or(axis.values[remaining % axis.values.len()], |(_, value)| *value);
-        point.push((axis.swept.name.clone(), value));
+        point.push((axis.swept_axis.name.clone(), value));
         remaining /= axis.values.len();
     }
     point

@@ -30,20 +30,23 @@ pub(crate) fn run_summary(source: &FigureFile, model: &dyn Figures) -> String {
 /// Writes the cautions about the results of a map.
 pub(crate) fn cautions(map: &CellMap, model: &dyn Figures) -> String {
     let item_name = if map.grid.merges_points() { "cells" } else { "points" };
-    let count = |is_counted: fn(&PointCounts) -> bool| {
-        map.counts.iter().filter(|cell| is_counted(cell)).count()
+    let count_cells = |is_counted: fn(&PointCounts) -> bool| {
+        map.point_counts.iter().filter(|cell| is_counted(cell)).count()
     };
-    let filled_count = count(|cell| cell.points > 0);
-    let [sensitive, failed] = [count(|cell| cell.sensitive > 0), count(|cell| cell.failed > 0)];
+    let filled_count = count_cells(|cell| cell.points > 0);
+    let [sensitive_cells, failed_cells] =
+        [count_cells(|cell| cell.sensitive_points > 0), count_cells(|cell| cell.failed_points > 0)];
     let mut notes = Vec::new();
-    if sensitive > 0 {
+    if sensitive_cells > 0 {
         notes.push(format!(
-            "{sensitive} of {filled_count} {item_name} are sensitive: the motion is chaotic, and \
-             its digits are those of one trajectory."
+            "{sensitive_cells} of {filled_count} {item_name} are sensitive: the motion is chaotic, \
+             and its digits are those of one trajectory."
         ));
     }
-    if failed > 0 {
-        notes.push(format!("{failed} of {filled_count} {item_name} failed; the map hatches them."));
+    if failed_cells > 0 {
+        notes.push(format!(
+            "{failed_cells} of {filled_count} {item_name} failed; the map hatches them."
+        ));
     }
     if map.grid.merges_points() {
         let phrase = "A cell holds several points and shows the worst of them. The file has all.";
@@ -62,8 +65,8 @@ const ASSUMPTIONS_NOTE: &str = "Numbers that nobody gave are assumed. The comman
 
 fn describe_time(time: &Value) -> Option<String> {
     let [from, to] = [time["window_s"][0].as_f64()?, time["window_s"][1].as_f64()?];
-    let end = time["end_s"].as_f64()?;
-    Some(format!("0 to {end} s; amplitudes are the largest deviations from {from} to {to} s"))
+    let end_s = time["end_s"].as_f64()?;
+    Some(format!("0 to {end_s} s; amplitudes are the largest deviations from {from} to {to} s"))
 }
 
 fn describe_method(integrator: &Value) -> Option<String> {

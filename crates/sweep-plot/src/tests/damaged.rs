@@ -41,7 +41,7 @@ fn a_histogram_without_values_has_a_scale() {
     let input = failed_design().write(folder.path(), "input.parquet");
     let source = open_source(&input, &PlotOptions::default(), &CommonFigures).unwrap();
     let scatter = Scatter::read(source, &PlotOptions::default()).unwrap();
-    let scale = chart::x_scale(&figures::histogram::chart(&scatter));
+    let scale = chart::chart_x_scale(&figures::histogram::histogram_chart(&scatter));
     assert!(scale.is_log && scale.from > 0.0 && scale.to > scale.from, "{scale:?}");
     assert!((2..=16).contains(&scale.ticks(9).len()));
 }
@@ -78,7 +78,8 @@ fn damaged_files_have_a_figure_or_an_error() {
                 figure_count += draw_all(&name, &sample, options);
             }
         }
-        let maps = [super::map(), map_of_three_axes(), map_of_one_axis(), super::boundary()];
+        let maps =
+            [super::map_sample(), map_of_three_axes(), map_of_one_axis(), super::boundary_sample()];
         for (k, sample) in maps.into_iter().enumerate() {
             let sample = sample.with_damage(&mut random).with_limit("ratio_max", limit);
             let name = format!("SEED={seed}, round {round}, map {k}");

@@ -260,7 +260,7 @@ fn many_points_are_all_counted_and_some_are_drawn() {
 #[test]
 fn a_list_of_a_whole_grid_is_drawn_as_a_map() {
     let error = error_message(draw(
-        super::super::sample::map(),
+        super::super::sample::map_sample(),
         &options_for_view(DesignView::Scatter),
         "a.svg",
     ));
@@ -273,7 +273,7 @@ fn a_list_of_a_whole_grid_is_drawn_as_a_map() {
     assert!(error_message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
     let listed_map = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
-        super::super::sample::map().with_metadata("sweep.listed", plan)
+        super::super::sample::map_sample().with_metadata("sweep.listed", plan)
     };
     assert!(draw_svg(listed_map(), &PlotOptions::default()).contains("linear model unreliable"));
     assert!(

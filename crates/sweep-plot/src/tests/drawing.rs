@@ -1,6 +1,6 @@
 //! Tests of positions in figures: isolated points, names of regions, legends.
 
-use super::super::sample::{MapSample, SampleFile, boundary, map};
+use super::super::sample::{MapSample, SampleFile, boundary_sample, map_sample};
 use super::super::scene::{Outline, SceneItem};
 use super::super::*;
 use super::draw_svg;
@@ -21,7 +21,7 @@ fn boundary_with_folds(axes: &str) -> SampleFile {
 fn draw_over_map(file: SampleFile) -> String {
     let folder = tempfile::tempdir().unwrap();
     let boundary = Some(file.write(folder.path(), "boundary.parquet"));
-    draw_svg(map(), &PlotOptions { boundary, ..PlotOptions::default() })
+    draw_svg(map_sample(), &PlotOptions { boundary, ..PlotOptions::default() })
 }
 
 const PLANNED_AXES: &str =
@@ -35,8 +35,8 @@ fn an_isolated_crossing_is_drawn_as_a_disc() {
         read::ModelKinds::default(),
     )
     .unwrap();
-    let chart = figures::boundary::chart(&table).unwrap();
-    let scene = chart::draw(&chart);
+    let chart = figures::boundary::boundary_chart(&table).unwrap();
+    let scene = chart::draw_chart(&chart);
     let segments = Outline::circle([0.0, 0.0], 3.0).0.len();
     let is_disc = |item: &&SceneItem| match item {
         SceneItem::Fill { outline, .. } => outline.0.len() == segments,
@@ -46,7 +46,7 @@ fn an_isolated_crossing_is_drawn_as_a_disc() {
     // Over a map each disc has a light rim.
     let [with_isolated, without_isolated] = [
         boundary_with_folds(PLANNED_AXES),
-        boundary().with_metadata("sweep.plan", &format!(r#"{{"axis": [{PLANNED_AXES}]}}"#)),
+        boundary_sample().with_metadata("sweep.plan", &format!(r#"{{"axis": [{PLANNED_AXES}]}}"#)),
     ];
     let count_discs = |file| draw_over_map(file).matches(r##"fill="#0b6b3a""##).count();
     assert_eq!((count_discs(without_isolated), count_discs(with_isolated)), (0, 2));
@@ -74,7 +74,7 @@ fn text_position(figure: &str, text: &str) -> [f64; 2] {
 #[test]
 fn names_of_regions_avoid_the_curve_of_a_boundary_file() {
     const NAME: &str = "linear model reliable";
-    let [_, y] = text_position(&draw_svg(map(), &PlotOptions::default()), NAME);
+    let [_, y] = text_position(&draw_svg(map_sample(), &PlotOptions::default()), NAME);
     // The panel's 440 px represent 45 to 315 N s/m; the middle of the name is above its baseline.
     let damping_at_name = 315.0 - (y - 5.6 - frame::HEADING_HEIGHT) / 440.0 * 270.0;
     let masses = (1..=10).map(|k| 0.1 * f64::from(k));
@@ -98,7 +98,7 @@ fn names_of_regions_avoid_the_line_between_them() {
         limit: 2.0,
         // The ratio exceeds the limit right of a line from the lower middle to the right edge.
         yaw: &|point| Some([0.01 * (2.0 + 2.0 * (point[0] - 0.7) - point[1] / 8.0).max(0.1), 0.01]),
-        chaotic: &|_| false,
+        is_chaotic: &|_| false,
     };
     let figure = draw_svg(corner.sample(), &PlotOptions::default());
     let [_, y] = text_position(&figure, "linear model unreliable");

@@ -15,7 +15,7 @@ fn integers_below(count: usize) -> Vec<f64> {
 
 /// Returns a map of `counts` points whose ratio lies between half and twice the limit, except for
 /// outliers.
-fn map(counts: [usize; 2]) -> MapSample<'static> {
+fn long_map(counts: [usize; 2]) -> MapSample<'static> {
     MapSample {
         axes: vec![
             ("unbalance_mass_kg", integers_below(counts[0])), // the first varies slowest
@@ -23,7 +23,7 @@ fn map(counts: [usize; 2]) -> MapSample<'static> {
         ],
         limit: 2.0,
         yaw: &|point| Some([0.01 * ratio(point), 0.01]),
-        chaotic: &|_| false,
+        is_chaotic: &|_| false,
     }
 }
 
@@ -56,7 +56,7 @@ fn memory_and_page_size_do_not_grow_with_the_rows() {
     let folder = tempfile::tempdir().unwrap();
     let mut peaks: Vec<[u64; 3]> = Vec::new();
     for counts in [[724, 724], [1448, 1448]] {
-        let input = map(counts).write_long(folder.path(), &format!("{}.parquet", counts[0]));
+        let input = long_map(counts).write_long(folder.path(), &format!("{}.parquet", counts[0]));
         peaks.push(["a.svg", "a.png", "a.html"].map(|name| {
             let mut written_bytes = 0;
             let heap =
@@ -81,7 +81,7 @@ fn memory_and_page_size_do_not_grow_with_the_rows() {
 fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
     let folder = tempfile::tempdir().unwrap();
     let counts = [500, 600];
-    let sample = map([500, 600]);
+    let sample = long_map([500, 600]);
     let data = page_data(&render_to(&sample.write_long(folder.path(), "map.parquet"), "a.html"));
     let spans = |k: usize| -> Vec<[f64; 2]> {
         let spans = data["axes"][k]["spans"].as_array().unwrap();
@@ -130,16 +130,17 @@ fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
 
 #[test]
 fn a_small_map_has_a_cell_for_every_point() {
-    let data = page_data(&draw(map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
+    let data =
+        page_data(&draw(long_map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
     assert!(data["counts"].is_null() && data["axes"][0]["spans"].is_null());
     assert!(data["layers"][0]["both"].is_null() && data["layers"][0]["undefined"].is_null());
-    assert!(!draw_svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
+    assert!(!draw_svg(long_map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
 }
 
 #[test]
 fn failed_points_are_hatched_in_cells_with_others() {
     let yaw = |point: &[f64]| (point[1] % 50.0 != 0.0).then_some([0.01, 0.01]);
-    let map_with_failures = MapSample { yaw: &yaw, ..map([500, 600]) };
+    let map_with_failures = MapSample { yaw: &yaw, ..long_map([500, 600]) };
     let folder = tempfile::tempdir().unwrap();
     let input = map_with_failures.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
@@ -157,7 +158,7 @@ fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
     let is_at_rest = |point: &[f64]| point[1] % 50.0 == 7.0;
     let is_chaotic = |point: &[f64]| (point[0] + point[1]) % 40.0 == 0.0;
     let yaw = |point: &[f64]| Some(if is_at_rest(point) { [0.0, 0.0] } else { [0.01, 0.01] });
-    let sample = MapSample { yaw: &yaw, chaotic: &is_chaotic, ..map([500, 600]) };
+    let sample = MapSample { yaw: &yaw, is_chaotic: &is_chaotic, ..long_map([500, 600]) };
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
@@ -184,11 +185,11 @@ fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
 #[test]
 fn sensitive_points_are_hatched_in_small_maps_too() {
     let is_chaotic = |point: &[f64]| point == [3.0, 4.0];
-    let sample = MapSample { chaotic: &is_chaotic, ..map([30, 40]) };
+    let sample = MapSample { is_chaotic: &is_chaotic, ..long_map([30, 40]) };
     let figure = draw_svg(sample.sample(), &PlotOptions::default());
     assert!(figure.contains(">sensitive: motion is chaotic<"));
     // Without sensitive points the picture lacks the hatch and its legend entry.
-    let figure_without = draw_svg(map([30, 40]).sample(), &PlotOptions::default());
+    let figure_without = draw_svg(long_map([30, 40]).sample(), &PlotOptions::default());
     assert!(!figure_without.contains("sensitive") && figure.len() > figure_without.len());
     let data = page_data(&draw(sample.sample(), &PlotOptions::default(), "a.html").unwrap());
     let words = &data["codes"]["sensitive"]["words"];
@@ -197,8 +198,10 @@ fn sensitive_points_are_hatched_in_small_maps_too() {
 
 #[test]
 fn an_axis_of_too_many_values_is_drawn_by_its_range() {
-    let one_axis =
-        MapSample { axes: vec![("damping_n_s_per_m", integers_below(300_000))], ..map([1, 1]) };
+    let one_axis = MapSample {
+        axes: vec![("damping_n_s_per_m", integers_below(300_000))],
+        ..long_map([1, 1])
+    };
     let one_axis = MapSample { yaw: &|point| Some([0.02 - 1e-8 * point[0], 0.01]), ..one_axis };
     let folder = tempfile::tempdir().unwrap();
     let input = one_axis.write_long(folder.path(), "map.parquet");
@@ -214,8 +217,10 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
         let outlier = if point[0] == 200_000.0 { 0.01 } else { 0.0 };
         Some([0.03 - 1e-7 * (point[0] - 2.5) + outlier, 0.01])
     };
-    let one_axis =
-        MapSample { axes: vec![("damping_n_s_per_m", integers_below(240_000))], ..map([1, 1]) };
+    let one_axis = MapSample {
+        axes: vec![("damping_n_s_per_m", integers_below(240_000))],
+        ..long_map([1, 1])
+    };
     let folder = tempfile::tempdir().unwrap();
     let input = MapSample { yaw: &yaw, ..one_axis }.write_long(folder.path(), "map.parquet");
     let phrase = ">both: reliable and unreliable points<";
@@ -232,7 +237,7 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
 
     // Cells of one point cannot hold both verdicts.
     let few_points = vec![("damping_n_s_per_m", integers_below(240))];
-    let few_points = MapSample { axes: few_points, yaw: &yaw, ..map([1, 1]) };
+    let few_points = MapSample { axes: few_points, yaw: &yaw, ..long_map([1, 1]) };
     assert!(!draw_svg(few_points.sample(), &PlotOptions::default()).contains(phrase));
 }
 
@@ -240,7 +245,8 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
 fn a_page_of_too_many_cuts_keeps_the_requested_one() {
     let values = || [40, 40, 60, 3].map(integers_below);
     let names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
-    let sample = || MapSample { axes: names.into_iter().zip(values()).collect(), ..map([1, 1]) };
+    let sample =
+        || MapSample { axes: names.into_iter().zip(values()).collect(), ..long_map([1, 1]) };
     let folder = tempfile::tempdir().unwrap();
     let input = sample().write_long(folder.path(), "map.parquet");
     let page = render_to(&input, "a.html");
@@ -265,7 +271,7 @@ fn a_page_of_too_many_cuts_keeps_the_requested_one() {
 fn repeated_points_are_found_in_cells_of_several_points() {
     let folder = tempfile::tempdir().unwrap();
     // The last value of the first axis is repeated, which no grid has.
-    let mut sample = map([500, 600]);
+    let mut sample = long_map([500, 600]);
     sample.axes[0].1[499] = 498.0;
     let input = sample.write_long(folder.path(), "map.parquet");
     let result =
@@ -302,7 +308,7 @@ fn scattered_rows_are_rejected_before_they_fill_the_memory() {
 #[test]
 fn columns_with_the_same_name_are_drawn() {
     let with_repeated_name =
-        map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
+        long_map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
     let with_repeated_name = with_repeated_name.numbers("later", "1", (0..1200).map(|_| 1.0));
     for name in ["a.svg", "a.html"] {
         assert!(draw(with_repeated_name.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
@@ -312,7 +318,7 @@ fn columns_with_the_same_name_are_drawn() {
 #[test]
 fn long_metadata_is_truncated_in_a_page() {
     let long_list = serde_json::to_string(&integers_below(100_000)).unwrap();
-    let sample = map([3, 4]).sample().with_metadata("note", &long_list);
+    let sample = long_map([3, 4]).sample().with_metadata("note", &long_list);
     let page = String::from_utf8(draw(sample, &PlotOptions::default(), "a.html").unwrap()).unwrap();
     let start = page.find("<dt>note</dt>").unwrap();
     let note = &page[start..start + page[start..].find("</dd>").unwrap()];

@@ -2,13 +2,13 @@
 
 use serde_json::Value;
 
-use super::super::sample::{SampleFile, map};
+use super::super::sample::{SampleFile, map_sample};
 use super::{draw, draw_page_data, draw_svg, error_message, map_of_one_axis, options_for_column};
 
 /// Returns a map with columns whose bad direction is greater, and others whose is less.
 fn map_with_metrics() -> SampleFile {
     let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
-    map()
+    map_sample()
         .numbers("cabinet_force_nonlinear_n", "N", rising(400.0))
         .with_worse("greater", None)
         .numbers("cabinet_force_linear_n", "N", rising(300.0))
@@ -66,7 +66,7 @@ fn metrics_are_drawn_by_their_column_names() {
     ];
     assert_eq!(row_names[2..], expected);
     for output in ["a.svg", "a.html"] {
-        let phrase = error_message(draw(map(), &options_for_column("static_sag_m"), output));
+        let phrase = error_message(draw(map_sample(), &options_for_column("static_sag_m"), output));
         assert!(
             phrase.contains("`--quantity static_sag_m`") && phrase.contains("status"),
             "{phrase}"
@@ -78,7 +78,7 @@ fn metrics_are_drawn_by_their_column_names() {
 fn a_two_sided_verdict_names_the_ratio_of_each_side() {
     let map_with_two_limits = || {
         let least_ratios = (0..90).map(|k| 0.3 + 0.01 * f64::from(k));
-        map().numbers("ratio_min", "1", least_ratios).with_worse("less", Some(0.5))
+        map_sample().numbers("ratio_min", "1", least_ratios).with_worse("less", Some(0.5))
     };
     let [figure_of_max, least_ratios] = ["ratio_max", "ratio_min"]
         .map(|name| draw_svg(map_with_two_limits(), &options_for_column(name)));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::sample::{SampleFile, boundary, map};
+use super::sample::{SampleFile, boundary_sample, map_sample};
 use super::*;
 
 /// Returns points of these unbalances over 200 to 300 rpm. Growth exceeds 0 from 230 to 250 rpm, in
@@ -35,9 +35,9 @@ fn draw_chart(sample: SampleFile, options: &impl DrawOptions) -> Value {
     page_data(&draw(sample, options, "figure.html").unwrap())["chart"].clone()
 }
 
-fn ranges(shades: &Value) -> Vec<[f64; 2]> {
+fn ranges(shaded_ranges: &Value) -> Vec<[f64; 2]> {
     let range_ends = |range: &Value| [0, 1].map(|end| range[end].as_f64().unwrap());
-    shades.as_array().unwrap().iter().map(range_ends).collect()
+    shaded_ranges.as_array().unwrap().iter().map(range_ends).collect()
 }
 
 #[test]
@@ -110,10 +110,10 @@ fn other_figures_shade_unstable_speeds() {
     let table = FigureTable::open(&file, MODEL_KINDS).unwrap();
     let time = table.numbers("time_s").unwrap();
     let speed = table.numbers("speed_rpm").unwrap();
-    let shades = ranges(&chart["shades"]);
-    assert!(!shades.is_empty());
+    let shaded_ranges = ranges(&chart["shades"]);
+    assert!(!shaded_ranges.is_empty());
     for (time, speed) in time.iter().zip(speed) {
-        let is_shaded = shades.iter().any(|[from, to]| (from..=to).contains(&time));
+        let is_shaded = shaded_ranges.iter().any(|[from, to]| (from..=to).contains(&time));
         let is_inside = (230.0..=250.0).contains(speed);
         let is_at_an_edge = (speed - 230.0).abs() < 1e-6 || (speed - 250.0).abs() < 1e-6;
         assert!(is_shaded == is_inside || is_at_an_edge, "{time} s, {speed} rpm");
@@ -136,7 +136,7 @@ fn a_map_shows_the_curve_of_a_boundary_over_its_axes() {
         let [x, y] = axes.map(|name| format!(r#"{{"parameter": "{name}", "values": [1, 2]}}"#));
         let plan =
             format!(r#"{{"name": "dwell", "quantity": "growth_per_s", "axis": [{x}, {y}]}}"#);
-        boundary().with_metadata("sweep.plan", &plan)
+        boundary_sample().with_metadata("sweep.plan", &plan)
     };
     let folder = tempfile::tempdir().unwrap();
     let same_axes =
@@ -146,8 +146,8 @@ fn a_map_shows_the_curve_of_a_boundary_over_its_axes() {
     let no_boundary = trace().write(folder.path(), "trace.parquet");
     let with_boundary =
         |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
-    let figure_without = draw_svg(map(), &default_options());
-    let figure = draw_svg(map(), &with_boundary(&same_axes));
+    let figure_without = draw_svg(map_sample(), &default_options());
+    let figure = draw_svg(map_sample(), &with_boundary(&same_axes));
     assert!(
         figure.contains(">traced boundary: no growth at any speed<"),
         "the legend names the line"
@@ -160,7 +160,7 @@ fn a_map_shows_the_curve_of_a_boundary_over_its_axes() {
         (&no_boundary, "a.svg", "`sweep boundary` writes a boundary file"),
         (&same_axes, "a.html", "`--boundary` is for maps drawn as .svg, .pdf or .png"),
     ] {
-        let error = error_message(draw(map(), &with_boundary(path), format));
+        let error = error_message(draw(map_sample(), &with_boundary(path), format));
         assert!(error.contains(phrase), "{error}");
     }
     let figure_of_boundary =
@@ -190,11 +190,14 @@ fn files_of_different_plans_are_not_drawn_together() {
     };
     let own_mass = 24.0;
     let other_mass = 20.0;
-    let map_with_plan =
-        || map().without_metadata("sweep.plan").with_metadata("sweep.plan", &plan(own_mass, axes));
+    let map_with_plan = || {
+        map_sample()
+            .without_metadata("sweep.plan")
+            .with_metadata("sweep.plan", &plan(own_mass, axes))
+    };
     let trace_with_plan = || trace().with_metadata("sweep.plan", &plan(own_mass, ""));
     let options_with_boundary = |tub, name| PlotOptions {
-        boundary: Some(write_with_plan(boundary(), tub, name)),
+        boundary: Some(write_with_plan(boundary_sample(), tub, name)),
         ..Default::default()
     };
     draw_svg(map_with_plan(), &options_with_boundary(own_mass, "b.parquet"));
