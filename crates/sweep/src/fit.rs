@@ -46,18 +46,19 @@ pub(crate) use report::FitReport;
 use search::{Descent, DescentError, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
-/// The range of additional starting values of a parameter without a given range, relative to its
+/// The range of further starting values of a parameter without a given range, as factors of its
 /// first starting value. Basis: a data sheet is seldom wrong by more. Doubling the width tries more
 /// distant minima with fewer starts near the first.
-const START_RATIO_RANGE: [f64; 2] = [0.3, 1.7];
-/// The greatest number of starting points from which a descent begins. Those with the least cost
-/// are taken. Basis: the test data have two minima. Doubling it doubles the time of a fit with
-/// `--starts`.
+const START_FACTOR_RANGE: [f64; 2] = [0.3, 1.7];
+/// The greatest number of descents. They begin at the first starting point and at the further ones
+/// with the least cost. Basis: the test data have two minima. Doubling it doubles the time of a fit
+/// with `--starts`.
 const MAX_DESCENTS: usize = 3;
-/// The seed of all random numbers.
+/// The seed of all random numbers of a fit.
 const SEED: u64 = 1;
-/// The greatest change of a fitted parameter by half the integration step, in standard errors.
-/// Basis: it adds some five percent to an error. Doubling it adds four times as much.
+/// The greatest change of a fitted parameter, in standard errors, at which the integration step is
+/// not halved. Basis: the change is that by half the step, and adds some five percent to a standard
+/// error. Doubling it adds four times as much.
 const MAX_STEP_EFFECT: f64 = 0.3;
 /// The greatest number of halvings of the integration step. Basis: test
 /// `reference_data_lead_to_the_truth` needs none. Doubling it makes a fit that needs them four
@@ -99,18 +100,19 @@ pub struct FitOptions {
 }
 
 impl FitOptions {
-    /// Refuses counts beyond those that the command line takes, for callers without one.
+    /// Checks that counts are in the ranges that the command line accepts, for callers other than
+    /// the command line.
     ///
     /// # Errors
     /// An option that is out of its range.
     pub(crate) fn check(&self) -> Result<(), sweep_engine::Error> {
-        for (option, count, least, most) in [
+        for (option, count, min_count, max_count) in [
             ("starts", self.starts, 1, 10_000),
             ("bootstrap", self.bootstrap, 0, 10_000),
             ("draws", self.draws, 0, 100_000),
         ] {
-            if !(least..=most).contains(&count) {
-                let expected = format!("a number from {least} to {most}");
+            if !(min_count..=max_count).contains(&count) {
+                let expected = format!("a number from {min_count} to {max_count}");
                 return Err(sweep_engine::Error::option(option, count, expected));
             }
         }
@@ -130,7 +132,7 @@ pub(crate) struct FinishedFit<'a> {
 
 /// The context of a fit: cancellation, progress and stored evaluations.
 pub(crate) struct FitContext<'a> {
-    /// The cancellation. The result of a cancelled fit means nothing.
+    /// The cancellation. A cancelled fit has no valid result.
     pub(crate) cancel: Cancel<'a>,
     /// A function that is called after every evaluation with the number of evaluations.
     pub(crate) report_evaluations: &'a (dyn Fn(usize) + Sync),
@@ -140,10 +142,12 @@ pub(crate) struct FitContext<'a> {
     pub(crate) fresh: bool,
 }
 
-/// Prepares a case of a fit: a measurement with the grid and its own constants.
+/// Prepares a case of a fit: a measurement, and the plan of its run by a grid and the constants of
+/// this measurement.
 ///
 /// # Errors
-/// Returns mistakes in the grid and the constants. An axis without a constant has its middle value.
+/// Returns mistakes in the grid and the constants. An axis without a constant is fixed at the
+/// middle of its range.
 pub(crate) fn prepare_case(
     grid: &WasherGridInput,
     constants: &[String],
@@ -165,11 +169,11 @@ fn middle_constants(
         |name: &str| constants.iter().any(|constant| constant.split('=').next() == Some(name));
     let varied_axes =
         plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(&axis.parameter.name));
-    let middle_constant = |axis: &crate::plan::Axis| {
+    let format_middle_constant = |axis: &crate::plan::Axis| {
         let [from, to] = axis.values.extremes();
         format!("{}={}", axis.parameter.name, 0.5 * (from + to))
     };
-    Ok(varied_axes.map(middle_constant).collect())
+    Ok(varied_axes.map(format_middle_constant).collect())
 }
 
 /// Reads the free parameters of `--free` and `--own`.
@@ -178,26 +182,28 @@ fn read_free_parameters(
     cases: &[FitCase],
 ) -> Result<Vec<FreeParameter>, Diagnostics> {
     let mistakes = Mistakes::default();
-    let mut free: Vec<FreeParameter> = Vec::new();
+    let mut free_parameters: Vec<FreeParameter> = Vec::new();
     let shared_texts = options.free.iter().map(|text| (text, "--free", &cases[..1]));
     let own_texts = options.own.iter().map(|text| (text, "--own", cases));
     for (text, option, cases) in shared_texts.chain(own_texts) {
         let location = Location::new(mistakes.add(option, text.as_str()), 0..text.len());
         for (k, case) in cases.iter().enumerate() {
-            let earlier_parameters: &[FreeParameter] = if cases.len() == 1 { &free } else { &[] };
-            let Some(read) =
+            let earlier_parameters: &[FreeParameter] =
+                if cases.len() == 1 { &free_parameters } else { &[] };
+            let Some(read_parameter) =
                 read_free_parameter(text, case, earlier_parameters, (&location, &mistakes))
             else {
                 break;
             };
-            free.push(FreeParameter { case: (option == "--own").then_some(k), ..read });
+            free_parameters
+                .push(FreeParameter { case: (option == "--own").then_some(k), ..read_parameter });
         }
     }
-    mistakes.finish(Some(free))
+    mistakes.finish(Some(free_parameters))
 }
 
-/// Reads a free parameter of a case, which must differ from the earlier ones, and reports its
-/// mistakes.
+/// Reads a free parameter from the text of an option, and reports mistakes in the text. A parameter
+/// among the earlier ones is a mistake.
 fn read_free_parameter(
     text: &str,
     case: &FitCase,
@@ -205,7 +211,7 @@ fn read_free_parameter(
     (location, mistakes): (&Location, &Mistakes),
 ) -> Option<FreeParameter> {
     let refuse = |title: String, expected: &str| mistakes.refuse(location, title, expected);
-    let (name, range) = match text.split_once('=') {
+    let (name, range_text) = match text.split_once('=') {
         Some((name, range)) => (name.trim(), Some(range)),
         None => (text.trim(), None),
     };
@@ -231,11 +237,11 @@ fn read_free_parameter(
         return refuse(format!("`{name}` is free twice"), "expected each once");
     }
     let allowed_bounds = parameter.range().bounds();
-    let parsed_range = range.map(|range| {
+    let parsed_range = range_text.map(|range| {
         let (from, to) = range.split_once(':')?;
         let [from, to] = [from.trim().parse().ok()?, to.trim().parse().ok()?];
-        let within = allowed_bounds[0] <= from && from < to && to <= allowed_bounds[1];
-        (within && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
+        let is_within_bounds = allowed_bounds[0] <= from && from < to && to <= allowed_bounds[1];
+        (is_within_bounds && f64::is_finite(from) && f64::is_finite(to)).then_some([from, to])
     });
     let Some(range) = parsed_range.unwrap_or(Some(allowed_bounds)) else {
         let expected = "expected NAME=FROM:TO with FROM below TO, both allowed";
@@ -257,15 +263,15 @@ fn read_free_parameter(
 /// Fits the free parameters on all threads of the current rayon pool; `None` after a cancellation.
 ///
 /// # Errors
-/// Returns mistakes in the options, and errors for data that do not depend on a parameter and for a
-/// model whose trajectory fails.
+/// Returns mistakes in the options, an error if the data do not depend on a parameter, and an error
+/// if a trajectory of the model fails at the start.
 pub(crate) fn fit<'a>(
     cases: Vec<FitCase>,
     options: &FitOptions,
     context: &FitContext<'a>,
 ) -> Result<Option<FinishedFit<'a>>, Error> {
     match run_fit(cases, options, context) {
-        Ok(fitted) => Ok(Some(fitted)),
+        Ok(finished_fit) => Ok(Some(finished_fit)),
         Err(DescentError::Cancelled) => Ok(None),
         Err(DescentError::Refused(error)) => Err(error),
     }
@@ -276,28 +282,32 @@ fn run_fit<'a>(
     options: &FitOptions,
     context: &FitContext<'a>,
 ) -> Result<FinishedFit<'a>, DescentError> {
-    let free = read_free_parameters(options, &cases)?;
-    let fixed_numbers = FixedNumbers::read(&options.known, &cases[0], &free)?;
+    let free_parameters = read_free_parameters(options, &cases)?;
+    let fixed_numbers = FixedNumbers::read(&options.known, &cases[0], &free_parameters)?;
     let method = Problem::select_method(&cases).map_err(Error::model)?;
-    let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
+    let model_kind = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
     let fits_shift = !options.no_shift;
     let cancel = context.cancel;
-    let mut problem = Problem { cases, free, model, fits_shift, method, simd, cancel };
-    let samples: usize = problem.cases.iter().map(|case| case.measurement.count_samples()).sum();
-    let unknowns = problem.unknowns() + problem.signals().count();
-    if unknowns >= samples {
+    let mut problem =
+        Problem { cases, free_parameters, model_kind, fits_shift, method, simd, cancel };
+    let sample_count: usize =
+        problem.cases.iter().map(|case| case.measurement.count_samples()).sum();
+    let unknown_count = problem.unknown_count() + problem.signals().count();
+    if unknown_count >= sample_count {
         let expected = "expected more samples, or fewer `--free`";
-        let message = format!("{unknowns} unknowns for {samples} samples: {expected}");
+        let message = format!("{unknown_count} unknowns for {sample_count} samples: {expected}");
         return Err(Error::Refused(message).into());
     }
     for case in &problem.cases {
-        let rpm = case.first_rpm().unwrap_or_default();
-        if rpm.abs() > REST_SPEED_RATIO * case.greatest_rpm() {
-            let unknown = "where its unbalance was then is not known: expected the record from \
-                           rest on";
-            let message =
-                format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measurement.name);
+        let first_rpm = case.first_rpm().unwrap_or_default();
+        if first_rpm.abs() > REST_SPEED_RATIO * case.greatest_rpm() {
+            let unknown_reason = "where its unbalance was then is not known: expected the record \
+                                  from rest on";
+            let message = format!(
+                "{} begins at {first_rpm:.0} rpm, and {unknown_reason}",
+                case.measurement.name
+            );
             return Err(Error::Refused(message).into());
         }
     }
@@ -315,13 +325,14 @@ fn run_fit<'a>(
         evaluation_count: &evaluation_count,
         max_evaluations: if is_suspect { units::MAX_TRIAL_EVALUATIONS } else { MAX_EVALUATIONS },
     };
-    let starts = u64::from(options.starts);
-    let mut minima = search.find_minima(starts);
-    let explains_record = |minima: &Vec<Descent>| {
+    let start_count = u64::from(options.starts);
+    let mut minima = search.find_minima(start_count);
+    let best_explains_record = |minima: &Vec<Descent>| {
         minima.first().is_some_and(|best| units::explains_record(&problem, best))
     };
-    if is_suspect && minima.as_ref().is_ok_and(explains_record) {
-        minima = MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.find_minima(starts);
+    if is_suspect && minima.as_ref().is_ok_and(best_explains_record) {
+        minima =
+            MinimumSearch { max_evaluations: MAX_EVALUATIONS, ..search }.find_minima(start_count);
     }
     stored_evaluations.as_ref().map_or(Ok(()), Evaluations::write)?;
     let mut minima = minima?;
@@ -337,9 +348,9 @@ fn run_fit<'a>(
         let comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
         problem.method = Method::rk4(0.5 * step_s);
         let finer_comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
-        let inverse_normal = algebra::pseudo_inverse(&best.equations.normal);
+        let inverse_normal_matrix = algebra::pseudo_inverse(&best.equations.normal_matrix);
         let changes = standardised_changes(
-            &inverse_normal,
+            &inverse_normal_matrix,
             &best.equations,
             &comparisons,
             &finer_comparisons,
@@ -354,33 +365,40 @@ fn run_fit<'a>(
         best = search.descend_from(&best.x)?.ok_or_else(failed_start_error)?;
         minima[0] = best.clone();
     }
-    let evaluations = evaluation_count.load(Ordering::Relaxed);
+    let total_evaluations = evaluation_count.load(Ordering::Relaxed);
     let comparisons = problem.compare(&best.x).ok_or(DescentError::Cancelled)?;
-    // A wrong unit may change the numbers so much that only the start shows the unit.
+    // A search of data in a wrong unit may change the parameters so much that only the comparison
+    // at the start shows the unit.
     let start_comparisons =
         problem.compare(&problem.start_point()).unwrap_or_else(|| comparisons.clone());
     let mut statistics = Statistics::from_comparisons(&problem, &comparisons, &best.equations);
     let tachometer_covariance = compute_tachometer_covariance(&problem, &best, &comparisons);
     statistics::add_scaled(&mut statistics.covariance, &tachometer_covariance, 1.0);
-    if problem.model == ModelKind::Linear {
-        // The numbers may compensate for the terms that the linear model lacks, without a residual.
-        problem.model = ModelKind::Nonlinear;
-        statistics.bias = problem.compare(&best.x).map(|nonlinear| {
+    if problem.model_kind == ModelKind::Linear {
+        // The fitted parameters may compensate for the terms that the linear model lacks, so that
+        // the residual does not show the lack.
+        problem.model_kind = ModelKind::Nonlinear;
+        statistics.standardised_bias = problem.compare(&best.x).map(|nonlinear| {
             standardised_changes(&statistics.covariance, &best.equations, &comparisons, &nonlinear)
         });
-        problem.model = ModelKind::Linear;
+        problem.model_kind = ModelKind::Linear;
     }
     let mut bootstrap_fits = None;
     if options.bootstrap > 0 && best.is_converged {
-        bootstrap_fits =
-            Some(bootstrap(&mut problem, &best.x, &comparisons, options.bootstrap, context)?);
+        bootstrap_fits = Some(fit_bootstrap_samples(
+            &mut problem,
+            &best.x,
+            &comparisons,
+            options.bootstrap,
+            context,
+        )?);
     }
     if best.is_converged && statistics.objection(&problem).is_none() {
-        let variances = statistics.variances(&best.equations);
+        let variances = statistics.signal_variances(&best.equations);
         statistics.influences =
             fixed_numbers.influences(&problem, &best.x, &comparisons, &best.equations, &variances);
     }
-    if statistics.worst_explained().is_none() {
+    if statistics.least_explained_signal().is_none() {
         suspected_unit_by_case.fill(None);
     }
     let report_data = report::ReportData {
@@ -390,7 +408,7 @@ fn run_fit<'a>(
         comparisons: &comparisons,
         start_comparisons: &start_comparisons,
         statistics: &statistics,
-        evaluations,
+        evaluations: total_evaluations,
         step_effect,
         bootstrap_fits: bootstrap_fits.as_deref(),
         draws: options.draws.into(),
@@ -402,15 +420,15 @@ fn run_fit<'a>(
     Ok(FinishedFit { problem, x: best.x, comparisons, report, evaluations: stored_evaluations })
 }
 
-/// Returns the error of a start at which the model fails.
+/// Returns the error for a starting point at which the model fails.
 fn failed_start_error() -> Error {
     let message = "the model does not get through the record at the starting values: expected a \
                    start from which it does (`--set NAME=VALUE`)";
     Error::Refused(message.to_owned())
 }
 
-/// Returns the change of each unknown, in standard errors, if another model replaces that of
-/// `comparisons`.
+/// Returns the change of each unknown, in standard errors, by which a fit of the model of
+/// `other_comparisons` would differ from that of the model of `comparisons`.
 fn standardised_changes(
     covariance: &[Vec<f64>],
     equations: &NormalEquations,
@@ -428,10 +446,10 @@ fn standardised_changes(
             *rhs -= algebra::dot(slope, &difference) / (sigma * sigma);
         }
     }
-    let inverse_normal = algebra::pseudo_inverse(&equations.normal);
+    let inverse_normal_matrix = algebra::pseudo_inverse(&equations.normal_matrix);
     let standardised_change = |k: usize| {
         let variance = covariance[k][k];
-        let change = algebra::dot(&inverse_normal[k], &rhs);
+        let change = algebra::dot(&inverse_normal_matrix[k], &rhs);
         if variance > 0.0 { change.abs() / variance.sqrt() } else { 0.0 }
     };
     (0..rhs.len()).map(standardised_change).collect()
@@ -443,15 +461,15 @@ fn compute_tachometer_covariance(
     best: &Descent,
     comparisons: &[SignalComparison],
 ) -> Vec<Vec<f64>> {
-    let n = problem.unknowns();
-    let inverse_normal = algebra::pseudo_inverse(&best.equations.normal);
-    let mut covariance = vec![vec![0.0; n]; n];
-    for (case, fit_case) in problem.cases.iter().enumerate() {
+    let unknown_count = problem.unknown_count();
+    let inverse_normal_matrix = algebra::pseudo_inverse(&best.equations.normal_matrix);
+    let mut covariance = vec![vec![0.0; unknown_count]; unknown_count];
+    for (case_index, fit_case) in problem.cases.iter().enumerate() {
         let random_spins =
             fit_case.smoothed_spin.as_ref().map(|spin| &spin.random_spins[..]).unwrap_or_default();
         let sigma = &best.equations.sigma[..];
         let right_sides = problem.compute_right_sides(
-            case,
+            case_index,
             &best.x,
             (comparisons, sigma),
             random_spins.len(),
@@ -462,7 +480,7 @@ fn compute_tachometer_covariance(
         let right_sides: Vec<Vec<f64>> = right_sides.into_iter().flatten().collect();
         for rhs in &right_sides {
             let changes: Vec<f64> =
-                inverse_normal.iter().map(|row| algebra::dot(row, rhs)).collect();
+                inverse_normal_matrix.iter().map(|row| algebra::dot(row, rhs)).collect();
             algebra::add_outer(&mut covariance, &changes, 1.0 / right_sides.len() as f64);
         }
     }
@@ -471,7 +489,7 @@ fn compute_tachometer_covariance(
 
 /// Fits `count` times with residuals that are resampled in blocks (the block bootstrap), and
 /// returns the free parameters of each fit.
-fn bootstrap(
+fn fit_bootstrap_samples(
     problem: &mut Problem<'_>,
     x: &[f64],
     comparisons: &[SignalComparison],
@@ -482,16 +500,16 @@ fn bootstrap(
     /// are correlated over some ten samples. Doubling it preserves slower correlations, but leaves
     /// fewer blocks.
     const BLOCK_SAMPLES: usize = 100;
-    let original_cases = problem.cases.clone();
-    let generator = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
+    let measured_cases = problem.cases.clone();
+    let uniform_design = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
     let mut draw_count = 0;
-    let mut fits = Vec::new();
+    let mut fitted_parameter_sets = Vec::new();
     for _ in 0..count {
         for comparison in comparisons {
             let residual = &comparison.residual;
             let mut resampled = Vec::with_capacity(residual.len() + BLOCK_SAMPLES);
             while resampled.len() < residual.len() {
-                let fraction = generator.position(draw_count, 0).unwrap_or(0.5);
+                let fraction = uniform_design.position(draw_count, 0).unwrap_or(0.5);
                 draw_count += 1;
                 let first_sample = (fraction * residual.len() as f64) as usize;
                 resampled.extend(
@@ -499,19 +517,21 @@ fn bootstrap(
                         .map(|i| residual[i % residual.len()]),
                 );
             }
-            let signal = &mut problem.cases[comparison.case].measurement.signals[comparison.signal];
+            let signal = &mut problem.cases[comparison.case_index].measurement.signals
+                [comparison.signal_index];
             let rows: Vec<usize> = signal.samples().map(|(row, _)| row).collect();
             for (row, residual) in rows.into_iter().zip(resampled) {
-                signal.values[row] = comparison.model[row] + comparison.offset + residual;
+                signal.values[row] = comparison.model_values[row] + comparison.offset + residual;
             }
         }
         let evaluation_count = AtomicUsize::new(0);
         let search = MinimumSearch::without_store(problem, context, &evaluation_count);
         let refit = search.descend_from(x)?.filter(|refit| refit.is_converged);
-        fits.extend(refit.map(|refit| refit.x[..problem.free.len()].to_vec()));
+        fitted_parameter_sets
+            .extend(refit.map(|refit| refit.x[..problem.free_parameters.len()].to_vec()));
     }
-    problem.cases = original_cases;
-    Ok(fits)
+    problem.cases = measured_cases;
+    Ok(fitted_parameter_sets)
 }
 
 /// A search for the least cost of a problem.
@@ -543,15 +563,16 @@ impl<'a> MinimumSearch<'a> {
 
     /// Computes the normal equations at a point, or reads stored ones.
     fn evaluate(&self, x: &[f64]) -> Result<Option<NormalEquations>, DescentError> {
-        let find = || {
+        let compute_equations = || {
             let comparisons = self.problem.compare(x);
             if self.problem.cancel.is_requested() {
                 return Err(DescentError::Cancelled);
             }
             Ok(comparisons.map(|comparisons| self.problem.normal_equations(&comparisons)))
         };
-        let equations =
-            self.stored_evaluations.map_or_else(find, |stored| stored.find_or_compute(x, find))?;
+        let equations = self.stored_evaluations.map_or_else(compute_equations, |stored| {
+            stored.find_or_compute(x, compute_equations)
+        })?;
         (self.context.report_evaluations)(
             1 + self.evaluation_count.fetch_add(1, Ordering::Relaxed),
         );
@@ -562,7 +583,7 @@ impl<'a> MinimumSearch<'a> {
     /// start.
     fn descend_from(&self, start: &[f64]) -> Result<Option<Descent>, DescentError> {
         let ranges: Vec<[f64; 2]> =
-            (0..self.problem.unknowns()).map(|k| self.problem.unknown_range(k)).collect();
+            (0..self.problem.unknown_count()).map(|k| self.problem.unknown_range(k)).collect();
         descend(start, &ranges, self.max_evaluations, &|x| self.evaluate(x))
     }
 
@@ -570,11 +591,11 @@ impl<'a> MinimumSearch<'a> {
     /// in ascending order of cost.
     fn find_minima(&self, start_count: u64) -> Result<Vec<Descent>, DescentError> {
         let start = self.problem.start_point();
-        let without_influence = |equations: &NormalEquations| {
-            let has_no_influence = |k: &usize| equations.normal[*k][*k] == 0.0;
-            let parameters = (0..self.problem.free.len()).filter(has_no_influence);
+        let join_names_without_influence = |equations: &NormalEquations| {
+            let lacks_influence = |k: &usize| equations.normal_matrix[*k][*k] == 0.0;
+            let parameters = (0..self.problem.free_parameters.len()).filter(lacks_influence);
             let names: Vec<&str> =
-                parameters.map(|k| self.problem.free[k].parameter.name()).collect();
+                parameters.map(|k| self.problem.free_parameters[k].parameter.name()).collect();
             (!names.is_empty()).then(|| names.join(", "))
         };
         let no_influence_error = |names: &str| {
@@ -582,7 +603,8 @@ impl<'a> MinimumSearch<'a> {
                             leave it out of `--free`";
             Error::Refused(format!("the measurement does not depend on {names}: {expected}"))
         };
-        let names_without_influence = self.evaluate(&start)?.as_ref().and_then(without_influence);
+        let names_without_influence =
+            self.evaluate(&start)?.as_ref().and_then(join_names_without_influence);
         if let (Some(names), 1) = (&names_without_influence, start_count) {
             return Err(no_influence_error(names).into());
         }
@@ -593,30 +615,35 @@ impl<'a> MinimumSearch<'a> {
                 points: start_count - 1,
                 seed: SEED,
             };
-            let draw_start = |point: u64, k: usize| {
-                let FreeParameter { range, start, .. } = &self.problem.free[k];
-                let range_of_starts = START_RATIO_RANGE.map(|share| share * start);
-                let is_bounded = range.iter().all(|end| end.is_finite());
-                let [from, to] = if is_bounded {
+            let draw_start_value = |point: u64, k: usize| {
+                let FreeParameter { range, start, .. } = &self.problem.free_parameters[k];
+                let default_range = START_FACTOR_RANGE.map(|factor| factor * start);
+                let has_finite_range = range.iter().all(|end| end.is_finite());
+                let [from, to] = if has_finite_range {
                     *range
                 } else {
-                    [range_of_starts[0].max(range[0]), range_of_starts[1]]
+                    [default_range[0].max(range[0]), default_range[1]]
                 };
                 from + design.position(point, k).unwrap_or(0.5) * (to - from)
             };
             let candidates: Vec<Vec<f64>> = (0..start_count - 1)
                 .map(|point| {
                     let mut x = start.clone();
-                    (0..self.problem.free.len()).for_each(|k| x[k] = draw_start(point, k));
+                    (0..self.problem.free_parameters.len())
+                        .for_each(|k| x[k] = draw_start_value(point, k));
                     x
                 })
                 .collect();
             let costs = self.problem.compute_costs(&candidates);
-            let mut by_cost: Vec<usize> =
+            let mut candidates_by_cost: Vec<usize> =
                 (0..candidates.len()).filter(|&k| costs[k].is_finite()).collect();
-            by_cost.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-            start_points
-                .extend(by_cost.into_iter().take(MAX_DESCENTS - 1).map(|k| candidates[k].clone()));
+            candidates_by_cost.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            start_points.extend(
+                candidates_by_cost
+                    .into_iter()
+                    .take(MAX_DESCENTS - 1)
+                    .map(|k| candidates[k].clone()),
+            );
         }
         let descents: Vec<_> =
             start_points.par_iter().map(|start| self.descend_from(start)).collect();
@@ -626,33 +653,37 @@ impl<'a> MinimumSearch<'a> {
         }
         minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
         // A parameter without influence at the first start may have one at the end of a descent.
-        let has_no_influence = |minimum: &Descent| without_influence(&minimum.equations).is_some();
-        if let Some(names) = names_without_influence.filter(|_| minima.iter().all(has_no_influence))
+        let names_parameter_without_influence =
+            |minimum: &Descent| join_names_without_influence(&minimum.equations).is_some();
+        if let Some(names) =
+            names_without_influence.filter(|_| minima.iter().all(names_parameter_without_influence))
         {
             return Err(no_influence_error(&names).into());
         }
-        let mut distinct: Vec<Descent> = Vec::new();
+        let mut distinct_minima: Vec<Descent> = Vec::new();
         for minimum in minima {
-            if !distinct.iter().any(|other| self.is_same_minimum(other, &minimum)) {
-                distinct.push(minimum);
+            if !distinct_minima.iter().any(|other| self.is_same_minimum(other, &minimum)) {
+                distinct_minima.push(minimum);
             }
         }
-        Ok(distinct)
+        Ok(distinct_minima)
     }
 
-    /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.
+    /// Returns whether two descents ended in the same minimum: every free parameter differs by at
+    /// most five standard errors, or by at most a thousandth of its value.
     fn is_same_minimum(&self, a: &Descent, b: &Descent) -> bool {
-        let inverse_normal = algebra::pseudo_inverse(&a.equations.normal);
-        (0..self.problem.free.len()).all(|k| {
-            let tolerance = (5.0 * inverse_normal[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
+        let inverse_normal_matrix = algebra::pseudo_inverse(&a.equations.normal_matrix);
+        (0..self.problem.free_parameters.len()).all(|k| {
+            let tolerance =
+                (5.0 * inverse_normal_matrix[k][k].max(0.0).sqrt()).max(1e-3 * a.x[k].abs());
             (a.x[k] - b.x[k]).abs() <= tolerance
         })
     }
 }
 
-/// Returns a function of a sample's number and k, which returns the k-th component of one of
-/// `count` samples of the standard normal distribution, drawn from a Latin hypercube.
-fn normal_sampler(count: u64) -> impl Fn(u64, usize) -> f64 {
+/// Returns a function that returns the component `k` of sample number `point`. The `count` samples
+/// of the standard normal distribution are drawn by Latin hypercube sampling.
+fn normal_quantile_sampler(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
@@ -667,17 +698,18 @@ fn draw_parameters(
     covariance: &[Vec<f64>],
     count: u64,
 ) -> Vec<Vec<f64>> {
-    let normal = normal_sampler(count);
-    let (unit, scale) = algebra::scale_to_unit_diagonal(covariance);
-    let eigen = EigenDecomposition::from_matrix(&unit);
-    let draw = |point: u64| {
-        let standard_normal: Vec<f64> = (0..scale.len()).map(|k| normal(point, k)).collect();
-        let correlated = eigen.apply(&standard_normal, |value| value.max(0.0).sqrt());
-        let value = |k: usize| {
+    let sample_normal = normal_quantile_sampler(count);
+    let (unit_matrix, scales) = algebra::scale_to_unit_diagonal(covariance);
+    let eigen = EigenDecomposition::from_matrix(&unit_matrix);
+    let draw_set = |point: u64| {
+        let standard_normal: Vec<f64> =
+            (0..scales.len()).map(|k| sample_normal(point, k)).collect();
+        let correlated_normal = eigen.apply(&standard_normal, |value| value.max(0.0).sqrt());
+        let value_in_range = |k: usize| {
             let [from, to] = problem.unknown_range(k);
-            (x[k] + scale[k] * correlated[k]).clamp(from, to)
+            (x[k] + scales[k] * correlated_normal[k]).clamp(from, to)
         };
-        (0..scale.len()).map(value).collect()
+        (0..scales.len()).map(value_in_range).collect()
     };
-    (0..count).map(draw).collect()
+    (0..count).map(draw_set).collect()
 }

@@ -119,7 +119,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
         }
     }
     for (case, (path, file)) in curves.iter().zip(curve_outputs).enumerate() {
-        file.finish(&fit_result.curves(case).into_bytes(path)?)?;
+        file.finish(&fit_result.curve_table(case).into_bytes(path)?)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
     let report = &fit_result.report;
@@ -130,7 +130,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
 /// equals sign.
 fn parse_column(text: &str) -> Result<(String, String), String> {
     match text.rsplit_once('=') {
-        Some((header, name)) if Measurement::is_name(name) => {
+        Some((header, name)) if Measurement::is_known_name(name) => {
             Ok((header.to_owned(), name.to_owned()))
         }
         Some((_, name)) => Err(format!(

@@ -26,55 +26,57 @@ use crate::plan::{AxisValues, point_input};
 use sweep_engine::design::{Design, DesignRule};
 use sweep_engine::plan::NumberSources;
 
-/// The format of the fuzzer's inputs.
+/// The decoder of the fuzzer's inputs.
 #[path = "../../../../fuzz/src/input.rs"]
-mod input;
+mod fuzz_input;
 
-fn testdata() -> PathBuf {
+fn testdata_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata")
 }
 
-fn sweeps() -> Vec<PathBuf> {
-    files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps"))
+fn sweep_paths() -> Vec<PathBuf> {
+    toml_paths(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps"))
 }
 
-fn files(folder: &Path) -> Vec<PathBuf> {
+fn toml_paths(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> =
+    let mut paths: Vec<_> =
         entries.filter(|path| path.extension().is_some_and(|x| x == "toml")).collect();
-    files.sort();
-    files
+    paths.sort();
+    paths
 }
 
 /// Loads a grid with the arguments in its first line.
 fn load_with_arguments(path: &Path) -> Result<Plan, Diagnostics> {
     let text = std::fs::read_to_string(path).unwrap();
-    let first = text.lines().next().unwrap_or_default();
+    let first_line = text.lines().next().unwrap_or_default();
     let arguments: Vec<_> =
-        first.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
-    let values = |option: &str| -> Vec<String> {
+        first_line.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
+    let values_of_option = |option: &str| -> Vec<String> {
         arguments
             .chunks(2)
             .filter(|pair| pair[0] == option)
             .map(|pair| pair[1].to_owned())
             .collect()
     };
-    let sets = values("--set");
-    let at_values = values("--at");
+    let set_values = values_of_option("--set");
+    let at_values = values_of_option("--at");
     if at_values.is_empty() {
-        load(path, &sets)
+        load(path, &set_values)
     } else {
-        WasherGridInput::file(path.to_owned(), sets).load_point(&at_values).map(|(plan, _)| plan)
+        WasherGridInput::file(path.to_owned(), set_values)
+            .load_point(&at_values)
+            .map(|(plan, _)| plan)
     }
 }
 
-/// Loads the text of a grid from a file in a temporary folder.
+/// Writes the text of a grid to a file in a temporary folder and loads it.
 pub(super) fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
     std::fs::write(&path, text).unwrap();
-    let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
-    load(&path, &sets).map_err(|diagnostics| diagnostics.to_string())
+    let set_values: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
+    load(&path, &set_values).map_err(|diagnostics| diagnostics.to_string())
 }
 
 pub(super) const MINIMAL_GRID: &str =
@@ -82,33 +84,33 @@ pub(super) const MINIMAL_GRID: &str =
 
 #[test]
 fn broken_files_are_refused_with_these_messages() {
-    let broken = files(&testdata().join("broken"));
-    assert!(broken.len() >= 40, "{} broken files", broken.len());
+    let broken_paths = toml_paths(&testdata_folder().join("broken"));
+    assert!(broken_paths.len() >= 40, "{} broken files", broken_paths.len());
     let mut settings = insta::Settings::clone_current();
-    settings.set_snapshot_path(testdata().join("broken"));
+    settings.set_snapshot_path(testdata_folder().join("broken"));
     settings.set_prepend_module_to_snapshot(false);
     settings.set_omit_expression(true);
-    let mut accepted = Vec::new();
+    let mut accepted_names = Vec::new();
     settings.bind(|| {
-        for path in broken {
+        for path in broken_paths {
             let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
             match load_with_arguments(&path) {
-                Ok(_) => accepted.push(name),
+                Ok(_) => accepted_names.push(name),
                 Err(mistakes) => {
-                    let folder = format!("{}/", testdata().join("broken").display());
-                    insta::assert_snapshot!(name, mistakes.to_string().replace(&folder, ""));
+                    let folder_prefix = format!("{}/", testdata_folder().join("broken").display());
+                    insta::assert_snapshot!(name, mistakes.to_string().replace(&folder_prefix, ""));
                 }
             }
         }
     });
-    assert_eq!(accepted, [""; 0], "accepted, but broken");
+    assert_eq!(accepted_names, [""; 0], "accepted, but broken");
 }
 
 #[test]
 fn every_sweep_of_the_repository_loads() {
-    let sweeps = sweeps();
-    assert!(sweeps.len() >= 6);
-    for path in sweeps {
+    let paths = sweep_paths();
+    assert!(paths.len() >= 6);
+    for path in paths {
         let plan = load(&path, &[]).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         assert_eq!(Some(plan.name.as_str()), path.file_stem().and_then(|stem| stem.to_str()));
     }
@@ -132,44 +134,50 @@ fn omitted_keys_have_their_defaults() {
         channels,
         ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_yaw", "tub_pitch"]
     );
-    let adaptive = |name: &str, rtol: f64, atol: f64| {
+    let adaptive_method = |name: &str, rtol: f64, atol: f64| {
         let method = METHODS.iter().find(|method| method.name == name).unwrap();
         method.with_settings(|setting| if setting.key == "rtol" { rtol } else { atol })
     };
-    let method = |text: &str| {
+    let method_of_grid = |text: &str| {
         load_text(format!("{MINIMAL_GRID}[integrator]\n{text}"), &[]).unwrap().integrator
     };
-    assert_eq!(method("method = \"rk4\""), rk4(2e-4));
-    assert_eq!(method("method = \"dopri5\""), adaptive("dopri5", 1e-6, 1e-9));
-    assert_eq!(method("method = \"additive\"\nrtol = 1e-8"), adaptive("additive", 1e-8, 1e-9));
-    assert_eq!(method("accuracy = 1e-4"), rk4_mass_scaled(1e-4));
+    assert_eq!(method_of_grid("method = \"rk4\""), rk4(2e-4));
+    assert_eq!(method_of_grid("method = \"dopri5\""), adaptive_method("dopri5", 1e-6, 1e-9));
+    assert_eq!(
+        method_of_grid("method = \"additive\"\nrtol = 1e-8"),
+        adaptive_method("additive", 1e-8, 1e-9)
+    );
+    assert_eq!(method_of_grid("accuracy = 1e-4"), rk4_mass_scaled(1e-4));
 }
 
 #[test]
 fn a_starter_grid_is_the_documented_one() {
-    let starter = load_text(include_str!("../commands/starter.toml"), &[]).unwrap();
-    assert_eq!(starter.points(), 16);
-    let bare = load_text(MINIMAL_GRID, &[]).unwrap();
-    assert_eq!((starter.integrator, starter.reliability), (bare.integrator, bare.reliability));
-    assert_eq!(starter.model, bare.model);
+    let starter_plan = load_text(include_str!("../commands/starter.toml"), &[]).unwrap();
+    assert_eq!(starter_plan.points(), 16);
+    let minimal_plan = load_text(MINIMAL_GRID, &[]).unwrap();
+    assert_eq!(
+        (starter_plan.integrator, starter_plan.reliability),
+        (minimal_plan.integrator, minimal_plan.reliability)
+    );
+    assert_eq!(starter_plan.model, minimal_plan.model);
 }
 
 #[test]
 fn criterion_and_metrics_are_part_of_the_plan_unless_they_are_the_default() {
-    let minimal = load_text(MINIMAL_GRID, &[]).unwrap();
-    assert_eq!(minimal.model.measures, Measures { dampers: 2, ..Measures::default() });
-    let explicit =
+    let minimal_plan = load_text(MINIMAL_GRID, &[]).unwrap();
+    assert_eq!(minimal_plan.model.measures, Measures { dampers: 2, ..Measures::default() });
+    let explicit_plan =
         load_text(format!("{MINIMAL_GRID}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
-    assert_eq!(explicit.to_json(), minimal.to_json());
-    let extended = format!(
+    assert_eq!(explicit_plan.to_json(), minimal_plan.to_json());
+    let extended_grid = format!(
         "metrics = [\"static_sag\", \"cabinet_force\"]\n{MINIMAL_GRID}[reliability]\ncriterion \
          = \"rms\"\n"
     );
-    let extended = load_text(extended, &[]).unwrap();
-    assert_eq!(extended.model.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
-    let json = extended.to_json();
-    assert_eq!(json["reliability"]["criterion"], "rms");
-    assert_eq!(json["metrics"], serde_json::json!(["static_sag", "cabinet_force"]));
+    let extended_plan = load_text(extended_grid, &[]).unwrap();
+    assert_eq!(extended_plan.model.measures.metrics, [Metric::StaticSag, Metric::CabinetForce]);
+    let plan_json = extended_plan.to_json();
+    assert_eq!(plan_json["reliability"]["criterion"], "rms");
+    assert_eq!(plan_json["metrics"], serde_json::json!(["static_sag", "cabinet_force"]));
 }
 
 #[test]
@@ -188,13 +196,13 @@ fn later_layers_override_earlier_ones() {
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 600.0, ramp_s: 50.0 }
     );
     // An axis of one damper overrides a constant for all of them.
-    let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
-    let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
+    let damper_axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
+    let plan = load_text(format!("{grid}{damper_axis}"), &[]).unwrap();
     let dampings = point_input(&plan, &plan.axis_values(1))
         .machine
         .dampers
         .iter()
-        .map(|d| d.damping_n_s_per_m)
+        .map(|damper| damper.damping_n_s_per_m)
         .collect::<Vec<_>>();
     assert_eq!(dampings, [60.0, 100.0]);
 }
@@ -232,8 +240,8 @@ fn a_written_machine_reads_back_the_same_bits() {
     with_all_elements.bushings[0].damping_n_s_per_m = [0.0, 12.0, 12.0];
     with_all_elements.bushings[0].cubic_n_per_m3[1] = 5e6;
     with_all_elements.further_unbalances[0].radius_m = -0.2;
-    let corners = [[0.5, -0.45, 0.26], [0.5, -0.45, -0.26], [-0.1, -0.45, 0.01]];
-    with_all_elements.feet = corners.map(|foot_m| washer_model::Foot { foot_m }).to_vec();
+    let foot_positions = [[0.5, -0.45, 0.26], [0.5, -0.45, -0.26], [-0.1, -0.45, 0.01]];
+    with_all_elements.feet = foot_positions.map(|foot_m| washer_model::Foot { foot_m }).to_vec();
     with_all_elements.cabinet = Some(washer_model::Cabinet { mass_kg: 31.5, ..Default::default() });
     for machine in [machine, Machine::paper(), with_all_elements] {
         let folder = tempfile::tempdir().unwrap();
@@ -242,62 +250,69 @@ fn a_written_machine_reads_back_the_same_bits() {
             machine_file(&machine, &NumberSources::default()),
         )
         .unwrap();
-        let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
-        assert_eq!(load(&grid, &[]).unwrap().model.machine, machine);
+        let grid_path = folder.path().join("grid.toml");
+        std::fs::write(&grid_path, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
+        assert_eq!(load(&grid_path, &[]).unwrap().model.machine, machine);
     }
 }
 
-/// Returns the message about a machine file, which is changed from that of the built-in machine.
+/// Returns the message about mistakes in the built-in machine's file after a change of its text. It
+/// is empty if there are none.
 fn machine_mistakes(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let file = change(machine_file(&Machine::paper(), &NumberSources::default()));
-    std::fs::write(folder.path().join("machine.toml"), file).unwrap();
-    let grid = folder.path().join("grid.toml");
-    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
-    let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
-    load(&grid, &sets).map_or_else(|mistakes| mistakes.to_string(), |_| String::new())
+    let machine_text = change(machine_file(&Machine::paper(), &NumberSources::default()));
+    std::fs::write(folder.path().join("machine.toml"), machine_text).unwrap();
+    let grid_path = folder.path().join("grid.toml");
+    std::fs::write(&grid_path, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
+    let set_values: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
+    load(&grid_path, &set_values).map_or_else(|mistakes| mistakes.to_string(), |_| String::new())
 }
 
 #[test]
 fn mistakes_in_elements_are_reported_with_their_place() {
-    let with_section = |text: &'static str| machine_mistakes(|file| format!("{file}{text}"), &[]);
-    let damper = "[[dampers]]\ncabinet_m = [0, -0.3, 0]\ntub_m = [0, -0.1, 0]\n\
+    let mistakes_with_section =
+        |text: &'static str| machine_mistakes(|file| format!("{file}{text}"), &[]);
+    let damper_section = "[[dampers]]\ncabinet_m = [0, -0.3, 0]\ntub_m = [0, -0.1, 0]\n\
                   damping_n_s_per_m = 0\n";
-    let damper_mistakes =
-        |text: &str| machine_mistakes(|file| format!("{file}{damper}{text}"), &[]);
-    let message = damper_mistakes("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
+    let mistakes_with_damper =
+        |text: &str| machine_mistakes(|file| format!("{file}{damper_section}{text}"), &[]);
+    let message = mistakes_with_damper("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
     assert!(message.contains("expected a number, 0 or greater"), "{message}");
-    let message = damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
+    let message =
+        mistakes_with_damper("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
     assert!(message.contains("did you mean `auto`?"), "{message}");
-    assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n"), "");
-    let message = damper_mistakes("friction_n = 40\nfriction_speed_m_per_s = 0\n");
+    assert_eq!(
+        mistakes_with_damper("friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n"),
+        ""
+    );
+    let message = mistakes_with_damper("friction_n = 40\nfriction_speed_m_per_s = 0\n");
     assert!(message.contains("a number from 1e-6 to 1000"), "{message}");
-    assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
+    assert_eq!(mistakes_with_damper("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
 
-    let message = with_section(
+    let message = mistakes_with_section(
         "[[stops]]\ntub_m = [0.4, 0, 0.2]\nclearance_m = 0.01\nstiffness_n_per_m = 4e4\n",
     );
     assert!(message.contains("`direction` is missing in"), "{message}");
-    let stop = |direction: &str| {
-        let text = format!(
+    let mistakes_with_stop = |direction: &str| {
+        let stop_section = format!(
             "[[stops]]\ntub_m = [0.4, 0, 0.2]\ndirection = {direction}\nclearance_m = \
              0.01\nstiffness_n_per_m = 4e4\n"
         );
-        machine_mistakes(|file| format!("{file}{text}"), &[])
+        machine_mistakes(|file| format!("{file}{stop_section}"), &[])
     };
-    assert!(stop("[0, 0]").contains("`direction` has 2 numbers"));
-    assert!(stop("[0, 0, 0]").contains("stop 1 has no direction"));
-    assert_eq!(stop("[0, 3, -4]"), "", "any length is made 1");
+    assert!(mistakes_with_stop("[0, 0]").contains("`direction` has 2 numbers"));
+    assert!(mistakes_with_stop("[0, 0, 0]").contains("stop 1 has no direction"));
+    assert_eq!(mistakes_with_stop("[0, 3, -4]"), "", "any length is made 1");
 
-    let unbalance = "[[further_unbalances]]\nmass_kg = 0.2\nx_m = 0.1\nradius_m = 0\n";
-    let message = machine_mistakes(|file| format!("{file}{unbalance}"), &[]);
+    let unbalance_section = "[[further_unbalances]]\nmass_kg = 0.2\nx_m = 0.1\nradius_m = 0\n";
+    let message = machine_mistakes(|file| format!("{file}{unbalance_section}"), &[]);
     assert!(message.contains("unbalance 2 is on the drum's axis"), "{message}");
     assert!(message.contains("radius_m = 0"), "{message}");
-    let message = with_section("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
+    let message =
+        mistakes_with_section("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
     assert!(message.contains("an array of numbers"), "{message}");
 
-    // Options set the numbers of elements that exist.
+    // Options set numbers only of elements that the machine has.
     assert_eq!(machine_mistakes(|file| file, &["friction_n=50"]), "");
     let message = machine_mistakes(|file| file, &["stop_1_clearance_m=0.01"]);
     assert!(message.contains("the machine has 0 stops"), "{message}");
@@ -307,37 +322,39 @@ fn mistakes_in_elements_are_reported_with_their_place() {
 
 #[test]
 fn a_machine_has_at_most_a_thousand_springs() {
-    let load_with = |springs: usize| {
+    let load_with_springs = |spring_count: usize| {
         let mut machine = Machine::paper();
-        machine.springs = vec![machine.springs[0]; springs];
+        machine.springs = vec![machine.springs[0]; spring_count];
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(
             folder.path().join("machine.toml"),
             machine_file(&machine, &NumberSources::default()),
         )
         .unwrap();
-        let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
-        load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
+        let grid_path = folder.path().join("grid.toml");
+        std::fs::write(&grid_path, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
+        load(&grid_path, &[]).map_err(|mistakes| mistakes.to_string())
     };
-    assert_eq!(load_with(1000).unwrap().model.machine.springs.len(), 1000);
-    assert!(load_with(1001).unwrap_err().contains("the machine has 1001 springs"));
+    assert_eq!(load_with_springs(1000).unwrap().model.machine.springs.len(), 1000);
+    assert!(load_with_springs(1001).unwrap_err().contains("the machine has 1001 springs"));
 }
 
 #[test]
 fn the_canonical_plan_distinguishes_plans_and_keeps_every_bit() {
-    let json = |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
-    let reordered =
+    let plan_json =
+        |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
+    let reordered_grid =
         "[time]\nend_s = 5e1\n[spin]\nramp_s = 50.0\npeak_rpm = 3.5e2\nprofile = \"triangular\"\n";
-    assert_eq!(json(MINIMAL_GRID, &[]), json(reordered, &[]));
-    assert_eq!(json(MINIMAL_GRID, &[]), json(MINIMAL_GRID, &["tub_mass_kg=23.87"]));
-    let unrounded = 0.1 + 0.2;
+    assert_eq!(plan_json(MINIMAL_GRID, &[]), plan_json(reordered_grid, &[]));
+    assert_eq!(plan_json(MINIMAL_GRID, &[]), plan_json(MINIMAL_GRID, &["tub_mass_kg=23.87"]));
+    let unrounded_mass_kg = 0.1 + 0.2;
     assert_ne!(
-        json(MINIMAL_GRID, &["tub_mass_kg=0.3"]),
-        json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded}")])
+        plan_json(MINIMAL_GRID, &["tub_mass_kg=0.3"]),
+        plan_json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded_mass_kg}")])
     );
     assert!(
-        json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded}")]).contains("0.30000000000000004")
+        plan_json(MINIMAL_GRID, &[&format!("tub_mass_kg={unrounded_mass_kg}")])
+            .contains("0.30000000000000004")
     );
 }
 
@@ -350,10 +367,14 @@ fn a_byte_order_mark_and_windows_line_ends_are_ignored() {
 #[test]
 fn files_that_cannot_be_read_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let message = |path: &Path| load(path, &[]).unwrap_err().to_string();
-    let missing = message(&folder.path().join("missing.toml"));
-    assert!(missing.contains("missing.toml") && missing.contains("sweep init"), "{missing}");
-    assert!(message(folder.path()).contains("cannot read the grid file"));
+    let refusal_message = |path: &Path| load(path, &[]).unwrap_err().to_string();
+    let missing_file_message = refusal_message(&folder.path().join("missing.toml"));
+    assert!(
+        missing_file_message.contains("missing.toml")
+            && missing_file_message.contains("sweep init"),
+        "{missing_file_message}"
+    );
+    assert!(refusal_message(folder.path()).contains("cannot read the grid file"));
     assert!(
         load_text(b"name = \"\xff\"", &[])
             .unwrap_err()
@@ -377,20 +398,20 @@ fn files_with_many_mistakes_have_short_messages() {
     assert!(message.contains("100000 mistakes (100 shown)"), "{}", &message[message.len() - 200..]);
     let times = "1,".repeat(20_000);
     let speeds = "2,".repeat(20_000);
-    let table = format!(
+    let table_grid = format!(
         "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = \
          9\n"
     );
-    assert!(load_text(table, &[]).unwrap_err().contains("20000 mistakes (100 shown)"));
-    let list = format!("values = [{}]", "nan,".repeat(200_000));
-    let axis = format!("{MINIMAL_GRID}[[axis]]\nparameter = \"tub_mass_kg\"\n{list}\n");
-    let message = load_text(axis, &[]).unwrap_err();
+    assert!(load_text(table_grid, &[]).unwrap_err().contains("20000 mistakes (100 shown)"));
+    let values_key = format!("values = [{}]", "nan,".repeat(200_000));
+    let axis_grid = format!("{MINIMAL_GRID}[[axis]]\nparameter = \"tub_mass_kg\"\n{values_key}\n");
+    let message = load_text(axis_grid, &[]).unwrap_err();
     assert!(message.len() < 100_000, "{}", message.len());
 }
 
 #[test]
 fn the_largest_grid_takes_no_memory() {
-    let axis = |name: &str, count: u64| {
+    let axis_text = |name: &str, count: u64| {
         format!(
             "[[axis]]\nparameter = \"{name}\"\nrange = {{ from = 1.0, to = 2.0, count = {count} \
              }}\n"
@@ -398,8 +419,8 @@ fn the_largest_grid_takes_no_memory() {
     };
     let grid = format!(
         "{MINIMAL_GRID}{}{}",
-        axis("tub_mass_kg", 1_000_000),
-        axis("shaft_mass_kg", 1_000_000)
+        axis_text("tub_mass_kg", 1_000_000),
+        axis_text("shaft_mass_kg", 1_000_000)
     );
     let plan = load_text(grid, &[]).unwrap();
     assert_eq!(plan.points(), 1_000_000_000_000);
@@ -407,11 +428,11 @@ fn the_largest_grid_takes_no_memory() {
     let max_u64 = "18446744073709551615";
     let grid = format!(
         "{MINIMAL_GRID}{}{}",
-        axis("tub_mass_kg", 1_000_000),
-        axis("shaft_mass_kg", 1_000_001)
+        axis_text("tub_mass_kg", 1_000_000),
+        axis_text("shaft_mass_kg", 1_000_001)
     );
     assert!(load_text(grid, &[]).unwrap_err().contains("too many grid points"));
-    let grid = format!("{MINIMAL_GRID}{}", axis("tub_mass_kg", 1))
+    let grid = format!("{MINIMAL_GRID}{}", axis_text("tub_mass_kg", 1))
         .replace("count = 1 ", &format!("count = {max_u64} "));
     assert!(load_text(grid, &[]).unwrap_err().contains("out of range"));
 }
@@ -452,9 +473,10 @@ const INSERTIONS: [&str; 24] = [
     "99999999999999999999",
 ];
 
-/// Asserts that a text is a plan with valid machines at all corners, or is refused with a message.
-fn assert_loads_or_explains(text: &[u8]) {
-    match load_text(text, &[]) {
+/// Asserts that the text of a grid gives a plan with valid machines at all corners of the axes'
+/// ranges, or is refused with a message.
+fn assert_loads_or_explains(grid_bytes: &[u8]) {
+    match load_text(grid_bytes, &[]) {
         Ok(plan) => {
             for corner in 0..plan.corners() {
                 let input = point_input(&plan, &plan.corner(corner));
@@ -470,14 +492,14 @@ fn assert_loads_or_explains(text: &[u8]) {
 #[test]
 fn the_fuzzers_corpus_loads_or_is_explained() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
-    let mut loaded = 0;
+    let mut loaded_count = 0;
     for entry in std::fs::read_dir(corpus).unwrap() {
         let bytes = std::fs::read(entry.unwrap().path()).unwrap();
-        let input = input::Input::new(&bytes);
+        let fuzz_input = fuzz_input::Input::new(&bytes);
         let folder = tempfile::tempdir().unwrap();
-        match load(&input.write(folder.path()).unwrap(), &input.sets) {
+        match load(&fuzz_input.write(folder.path()).unwrap(), &fuzz_input.sets) {
             Ok(plan) => {
-                loaded += 1;
+                loaded_count += 1;
                 assert_eq!(
                     point_input(&plan, &plan.axis_values(plan.points() - 1)).machine.violations(),
                     []
@@ -486,7 +508,7 @@ fn the_fuzzers_corpus_loads_or_is_explained() {
             Err(mistakes) => assert!(mistakes.to_string().contains("nothing was done")),
         }
     }
-    assert!(loaded >= 2, "the seeds themselves are sound");
+    assert!(loaded_count >= 2, "the seeds themselves are sound");
 }
 
 proptest! {
@@ -508,26 +530,26 @@ proptest! {
 
     #[test]
     fn any_mutation_of_a_valid_grid_loads_or_is_explained(
-        start in 0_usize..5,
+        grid_index in 0_usize..5,
         edits in prop::collection::vec(
             (any::<prop::sample::Index>(), 0_usize..20, 0_usize..INSERTIONS.len(), any::<bool>()),
             1..5,
         ),
     ) {
-        let mut text = match start {
+        let mut text = match grid_index {
             0 => include_str!("../commands/starter.toml").to_owned(),
-            k => std::fs::read_to_string(&sweeps()[k]).unwrap(),
+            k => std::fs::read_to_string(&sweep_paths()[k]).unwrap(),
         };
-        for (position, deleted, insertion, insert) in edits {
+        for (position, deleted_length, insertion_index, inserts_text) in edits {
             let boundaries: Vec<_> = text.char_indices().map(|(index, _)| index).collect();
             if boundaries.is_empty() { break; }
             let start_index = *position.get(&boundaries);
             let end_index = boundaries
                 .iter()
                 .copied()
-                .find(|&index| index >= start_index + deleted)
+                .find(|&index| index >= start_index + deleted_length)
                 .unwrap_or(text.len());
-            let replacement = if insert { INSERTIONS[insertion] } else { "" };
+            let replacement = if inserts_text { INSERTIONS[insertion_index] } else { "" };
             text.replace_range(start_index..end_index, replacement);
         }
         assert_loads_or_explains(text.as_bytes());
@@ -537,33 +559,33 @@ proptest! {
     fn any_constant_loads_or_is_explained(
         name in "[a-z_0-9=.]{0,40}",
         value in "\\PC{0,20}",
-        known in any::<bool>(),
+        uses_known_name in any::<bool>(),
     ) {
-        let name = if known { "damping_n_s_per_m" } else { name.as_str() };
-        let set = format!("{name}={value}");
-        if let Err(mistakes) = load_text(MINIMAL_GRID, &[&set]) {
+        let name = if uses_known_name { "damping_n_s_per_m" } else { name.as_str() };
+        let assignment = format!("{name}={value}");
+        if let Err(mistakes) = load_text(MINIMAL_GRID, &[&assignment]) {
             assert!(mistakes.contains("nothing was done"));
         }
     }
 
     #[test]
     fn any_number_of_a_machine_file_loads_or_is_explained(
-        line in 0_usize..60,
+        line_number in 0_usize..60,
         value in any::<f64>(),
     ) {
-        let machine = machine_file(&Machine::paper(), &NumberSources::default());
-        let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
-        let line = line % lines.len();
-        if let Some((key, rest)) = lines[line].clone().split_once(" = ") {
+        let machine_text = machine_file(&Machine::paper(), &NumberSources::default());
+        let mut lines: Vec<String> = machine_text.lines().map(str::to_owned).collect();
+        let line_index = line_number % lines.len();
+        if let Some((key, rest)) = lines[line_index].clone().split_once(" = ") {
             let is_array = rest.starts_with('[');
-            lines[line] = if is_array { format!("{key} = [{value:?}, 1.0, \
+            lines[line_index] = if is_array { format!("{key} = [{value:?}, 1.0, \
                                              1.0]") } else { format!("{key} = {value:?}") };
         }
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("machine.toml"), lines.join("\n")).unwrap();
-        let grid = folder.path().join("grid.toml");
-        std::fs::write(&grid, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
-        match load(&grid, &[]) {
+        let grid_path = folder.path().join("grid.toml");
+        std::fs::write(&grid_path, format!("machine = \"machine.toml\"\n{MINIMAL_GRID}")).unwrap();
+        match load(&grid_path, &[]) {
             Ok(plan) => assert_eq!(plan.model.machine.violations(), []),
             Err(mistakes) => assert!(mistakes.count() >= 1),
         }
@@ -572,36 +594,44 @@ proptest! {
 
 #[test]
 fn a_design_is_ranges_and_a_number_of_points() {
-    let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 1.0 }\n\
+    let axis_texts = "[[axis]]\nparameter = \"unbalance_mass_kg\"\n\
+                range = { from = 0.1, to = 1.0 }\n\
                 [[axis]]\nparameter = \"bearing_stiffness_n_per_m\"\nrange = { from = 1e6, to = \
                 1e9, spacing = \"log\" }\n";
-    let plan =
-        |design: &str| load_text(format!("{MINIMAL_GRID}[design]\n{design}\n{axes}"), &[]).unwrap();
-    let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
-    assert_eq!(sobol.design, Some(Design::Spread { rule: DesignRule::Sobol, points: 64, seed: 3 }));
-    let latin = plan("method = \"latin_hypercube\"\npoints = 64");
-    assert_eq!((latin.points(), latin.to_json()["design"]["seed"].as_u64()), (64, Some(0)));
-    assert_ne!(latin.axis_values(0), sobol.axis_values(0));
-    assert_eq!(latin.to_json()["axis"][0]["range"].get("count"), None);
+    let plan_with_design = |design: &str| {
+        load_text(format!("{MINIMAL_GRID}[design]\n{design}\n{axis_texts}"), &[]).unwrap()
+    };
+    let sobol_plan = plan_with_design("method = \"sobol\"\npoints = 64\nseed = 3");
+    assert_eq!(
+        sobol_plan.design,
+        Some(Design::Spread { rule: DesignRule::Sobol, points: 64, seed: 3 })
+    );
+    let latin_plan = plan_with_design("method = \"latin_hypercube\"\npoints = 64");
+    assert_eq!(
+        (latin_plan.points(), latin_plan.to_json()["design"]["seed"].as_u64()),
+        (64, Some(0))
+    );
+    assert_ne!(latin_plan.axis_values(0), sobol_plan.axis_values(0));
+    assert_eq!(latin_plan.to_json()["axis"][0]["range"].get("count"), None);
     assert_eq!(load_text(MINIMAL_GRID, &[]).unwrap().to_json().get("design"), None);
 }
 
 #[test]
 fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
     let folder = tempfile::tempdir().unwrap();
-    let grid = folder.path().join("grid.toml");
+    let grid_path = folder.path().join("grid.toml");
     std::fs::write(
-        &grid,
+        &grid_path,
         format!("{MINIMAL_GRID}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n"),
     )
     .unwrap();
     let load_list = |csv: &str| {
         std::fs::write(folder.path().join("points.csv"), csv).unwrap();
-        load(&grid, &[]).unwrap()
+        load(&grid_path, &[]).unwrap()
     };
-    let text =
+    let list_text =
         "\u{feff}# by hand\n\"unbalance_mass_kg\", spin_ramp_s\r\n0.25, 5e1\r\n\r\n0.5, 40\r\n";
-    let plan = load_list(text);
+    let plan = load_list(list_text);
     assert_eq!(plan.points(), 2);
     assert_eq!(
         [plan.axis_values(0), plan.axis_values(1)],
@@ -611,21 +641,22 @@ fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
         point_input(&plan, &plan.axis_values(1)).spin,
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 40.0 }
     );
-    let changed = load_list(&text.replace("40", "41"));
-    assert_ne!(plan.to_json()["design"]["hash"], changed.to_json()["design"]["hash"]);
-    assert_eq!(plan.to_json()["axis"], changed.to_json()["axis"]);
-    let point = WasherGridInput::file(grid, Vec::new())
+    let changed_plan = load_list(&list_text.replace("40", "41"));
+    assert_ne!(plan.to_json()["design"]["hash"], changed_plan.to_json()["design"]["hash"]);
+    assert_eq!(plan.to_json()["axis"], changed_plan.to_json()["axis"]);
+    let point_plan = WasherGridInput::file(grid_path, Vec::new())
         .load_point(&["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
         .unwrap()
         .0;
-    assert_eq!((point.points(), point.design), (1, None));
+    assert_eq!((point_plan.points(), point_plan.design), (1, None));
 }
 
 #[test]
 fn a_name_from_the_command_line_replaces_an_invalid_file_name() {
-    let text = include_str!("../../../../sweeps/quick.toml").lines();
-    let text = text.filter(|line| !line.starts_with("name")).map(|line| format!("{line}\n"));
-    let input = WasherGridInput::text("my grid", text.collect(), Vec::new());
+    let grid_lines = include_str!("../../../../sweeps/quick.toml").lines();
+    let unnamed_lines =
+        grid_lines.filter(|line| !line.starts_with("name")).map(|line| format!("{line}\n"));
+    let input = WasherGridInput::text("my grid", unnamed_lines.collect(), Vec::new());
     let refusal = input.load().unwrap_err().to_string();
     assert!(refusal.contains("or pass `--name`"), "{refusal}");
     assert_eq!(input.with_name(Some("mine".to_owned())).load().unwrap().name, "mine");

@@ -1,4 +1,4 @@
-//! Small symmetric matrices by their eigenvalues.
+//! Eigenvalues and pseudo-inverses of small symmetric matrices.
 
 /// A symmetric matrix as its eigenvalues and eigenvectors.
 pub(crate) struct EigenDecomposition {
@@ -18,14 +18,14 @@ impl EigenDecomposition {
         let mut v: Vec<Vec<f64>> =
             (0..n).map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect()).collect();
         for _ in 0..60 {
-            let mut largest = 0.0_f64;
+            let mut largest_ratio = 0.0_f64;
             for p in 0..n {
                 for q in p + 1..n {
                     let scale = (a[p][p] * a[q][q]).abs().sqrt();
                     if a[p][q] == 0.0 || a[p][q].abs() <= 1e-18 * scale {
                         continue;
                     }
-                    largest = largest.max(a[p][q].abs() / scale.max(f64::MIN_POSITIVE));
+                    largest_ratio = largest_ratio.max(a[p][q].abs() / scale.max(f64::MIN_POSITIVE));
                     let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
                     let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
                     let c = 1.0 / (t * t + 1.0).sqrt();
@@ -39,24 +39,24 @@ impl EigenDecomposition {
                     }
                 }
             }
-            if largest < 1e-15 {
+            if largest_ratio < 1e-15 {
                 break;
             }
         }
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
+        let mut ascending_order: Vec<usize> = (0..n).collect();
+        ascending_order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
         Self {
-            values: order.iter().map(|&i| a[i][i]).collect(),
-            vectors: order.iter().map(|&i| v[i].clone()).collect(),
+            values: ascending_order.iter().map(|&i| a[i][i]).collect(),
+            vectors: ascending_order.iter().map(|&i| v[i].clone()).collect(),
         }
     }
 
-    /// Returns the product of a function of the matrix, which is that of its eigenvalues, and a
-    /// vector.
-    pub(crate) fn apply(&self, x: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
+    /// Applies a function to the matrix (to its eigenvalues) and returns the product of the result
+    /// with a vector.
+    pub(crate) fn apply(&self, x: &[f64], eigenvalue_function: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut product = vec![0.0; x.len()];
         for (value, vector) in self.values.iter().zip(&self.vectors) {
-            let component = f(*value) * dot(vector, x);
+            let component = eigenvalue_function(*value) * dot(vector, x);
             product.iter_mut().zip(vector).for_each(|(product, v)| *product += component * v);
         }
         product
@@ -71,27 +71,28 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Scales a matrix to a unit diagonal, and returns it with the square roots of its diagonal. A row
 /// of zeros stays, with the scale 1.
 pub(crate) fn scale_to_unit_diagonal(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
-    let scale: Vec<f64> = (0..matrix.len())
+    let scales: Vec<f64> = (0..matrix.len())
         .map(|i| if matrix[i][i] > 0.0 { matrix[i][i].sqrt() } else { 1.0 })
         .collect();
-    let row = |(i, row): (usize, &Vec<f64>)| {
-        row.iter().enumerate().map(|(j, x)| x / (scale[i] * scale[j])).collect()
+    let scale_row = |(i, row): (usize, &Vec<f64>)| {
+        row.iter().enumerate().map(|(j, x)| x / (scales[i] * scales[j])).collect()
     };
-    (matrix.iter().enumerate().map(row).collect(), scale)
+    (matrix.iter().enumerate().map(scale_row).collect(), scales)
 }
 
-/// Returns the pseudo-inverse of a symmetric matrix. Once its diagonal is one, eigenvalues below
-/// 1e-13 count as zero, because rounding errors are as large.
+/// Returns the pseudo-inverse of a symmetric matrix. The matrix is scaled to a unit diagonal, and
+/// eigenvalues below 1e-13 then count as zero, because rounding errors are as large.
 pub(crate) fn pseudo_inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let (unit, scale) = scale_to_unit_diagonal(matrix);
-    let eigen = EigenDecomposition::from_matrix(&unit);
-    let column = |j: usize| {
-        let mut e = vec![0.0; unit.len()];
-        e[j] = 1.0 / scale[j];
-        let x = eigen.apply(&e, |value| if value > 1e-13 { 1.0 / value } else { 0.0 });
-        x.iter().zip(&scale).map(|(x, scale)| x / scale).collect()
+    let (unit_matrix, scales) = scale_to_unit_diagonal(matrix);
+    let eigen = EigenDecomposition::from_matrix(&unit_matrix);
+    let inverse_column = |j: usize| {
+        let mut scaled_unit_vector = vec![0.0; unit_matrix.len()];
+        scaled_unit_vector[j] = 1.0 / scales[j];
+        let x =
+            eigen.apply(&scaled_unit_vector, |value| if value > 1e-13 { 1.0 / value } else { 0.0 });
+        x.iter().zip(&scales).map(|(x, scale)| x / scale).collect()
     };
-    (0..matrix.len()).map(column).collect()
+    (0..matrix.len()).map(inverse_column).collect()
 }
 
 /// Subtracts the mean from numbers, and returns them with the mean.

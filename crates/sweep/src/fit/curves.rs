@@ -10,60 +10,67 @@ use super::model::SignalComparison;
 use super::spectrum::compute_spectrum;
 use super::{FinishedFit, Problem};
 
-/// The greatest distance of a profile's points from the best value, in half standard errors. Basis:
-/// three standard errors include every interval of 95 %. Doubling it doubles the evaluations.
+/// The greatest distance of a cost profile's points from the fitted value, in half standard errors.
+/// Basis: three standard errors include every interval of 95 %. Doubling it doubles the
+/// evaluations.
 const PROFILE_HALF_STEPS: i32 = 6;
 
 impl FinishedFit<'_> {
-    /// Computes the rise of the cost about the best value of each free number, with the others
-    /// fitted again to first order.
-    fn profiles(&self) -> Value {
-        let Problem { free, .. } = &self.problem;
+    /// Computes the cost profile of each free number: the rise of the cost at values about the
+    /// fitted one, with the other numbers fitted again to first order.
+    fn profiles_json(&self) -> Value {
+        let Problem { free_parameters: free, .. } = &self.problem;
         let equations = self.problem.normal_equations(&self.comparisons);
-        let inverse_normal = pseudo_inverse(&equations.normal);
-        let deviations: Vec<f64> =
+        let inverse_normal_matrix = pseudo_inverse(&equations.normal_matrix);
+        let standard_deviations: Vec<f64> =
             (-PROFILE_HALF_STEPS..=PROFILE_HALF_STEPS).map(|k| 0.5 * f64::from(k)).collect();
         let values_at_deviation = |k: usize, deviation: f64| -> Vec<f64> {
-            let step = deviation / inverse_normal[k][k].max(f64::MIN_POSITIVE).sqrt();
+            let step = deviation / inverse_normal_matrix[k][k].max(f64::MIN_POSITIVE).sqrt();
             (0..self.x.len())
                 .map(|j| {
                     let [from, to] = self.problem.unknown_range(j);
-                    (self.x[j] + step * inverse_normal[k][j]).clamp(from, to)
+                    (self.x[j] + step * inverse_normal_matrix[k][j]).clamp(from, to)
                 })
                 .collect()
         };
-        let value_sets: Vec<Vec<f64>> = (0..free.len())
-            .flat_map(|k| deviations.iter().map(move |deviation| (k, *deviation)))
+        let sampled_unknowns: Vec<Vec<f64>> = (0..free.len())
+            .flat_map(|k| standard_deviations.iter().map(move |deviation| (k, *deviation)))
             .map(|(k, deviation)| values_at_deviation(k, deviation))
             .collect();
-        let costs = self.problem.compute_costs(&value_sets);
-        let profile = |k: usize| {
-            let indices = k * deviations.len()..(k + 1) * deviations.len();
+        let costs = self.problem.compute_costs(&sampled_unknowns);
+        let profile_json = |k: usize| {
+            let sample_indices = k * standard_deviations.len()..(k + 1) * standard_deviations.len();
             let cost_increases: Vec<f64> =
-                costs[indices.clone()].iter().map(|cost| cost - equations.cost).collect();
+                costs[sample_indices.clone()].iter().map(|cost| cost - equations.cost).collect();
             json!({
                 "name": free[k].parameter.name(),
-                "values": value_sets[indices].iter().map(|values| values[k]).collect::<Vec<_>>(),
-                "deviations": deviations,
+                "values": sampled_unknowns[sample_indices]
+                    .iter()
+                    .map(|values| values[k])
+                    .collect::<Vec<_>>(),
+                "deviations": standard_deviations,
                 "cost_above": cost_increases,
             })
         };
-        (0..free.len()).map(profile).collect()
+        (0..free.len()).map(profile_json).collect()
     }
 
     /// Computes the spectra of a case's measurement and of its residual; missing samples count as
     /// zero.
-    fn spectra(&self, case: usize) -> Value {
+    fn spectra_json(&self, case: usize) -> Value {
         let measurement = &self.problem.cases[case].measurement;
         let step_s = usual_step(&measurement.time_s).unwrap_or(1.0);
         let mut frequencies_hz = Vec::new();
-        let mut column = |comparison: &SignalComparison| {
-            let signal = &measurement.signals[comparison.signal];
+        let mut column_json = |comparison: &SignalComparison| {
+            let signal = &measurement.signals[comparison.signal_index];
             let mut spectral_density = |values: &[f64]| {
-                let mut with_zeros = vec![0.0; measurement.time_s.len()];
-                signal.samples().zip(values).for_each(|((row, _), value)| with_zeros[row] = *value);
+                let mut values_with_zeros = vec![0.0; measurement.time_s.len()];
+                signal
+                    .samples()
+                    .zip(values)
+                    .for_each(|((row, _), value)| values_with_zeros[row] = *value);
                 let density;
-                (frequencies_hz, density) = compute_spectrum(&with_zeros, step_s);
+                (frequencies_hz, density) = compute_spectrum(&values_with_zeros, step_s);
                 density
             };
             json!({
@@ -73,13 +80,14 @@ impl FinishedFit<'_> {
                 "residual": spectral_density(&comparison.residual),
             })
         };
-        let comparisons = self.comparisons.iter().filter(|comparison| comparison.case == case);
-        let columns: Vec<Value> = comparisons.map(&mut column).collect();
+        let comparisons =
+            self.comparisons.iter().filter(|comparison| comparison.case_index == case);
+        let columns: Vec<Value> = comparisons.map(&mut column_json).collect();
         json!({ "hz": frequencies_hz, "columns": columns })
     }
 
     /// Returns the curves of a case.
-    pub(crate) fn curves(&self, case: usize) -> Table {
+    pub(crate) fn curve_table(&self, case: usize) -> Table {
         let fit_case = &self.problem.cases[case];
         let measurement = &fit_case.measurement;
         let mut table = Table::new(crate::identity::BUILD);
@@ -88,8 +96,10 @@ impl FinishedFit<'_> {
         let shift_s = self.problem.shift_s(case, &self.x);
         let speeds = fit_case.spin().speeds_rpm(times.iter().map(|time| time + shift_s)).map(Some);
         table.add_numbers("speed_rpm", "rpm", "spin of the shaft, smoothed if measured", speeds);
-        for comparison in self.comparisons.iter().filter(|comparison| comparison.case == case) {
-            let SignalComparison { signal, offset, model, .. } = comparison;
+        for comparison in self.comparisons.iter().filter(|comparison| comparison.case_index == case)
+        {
+            let SignalComparison { signal_index: signal, offset, model_values: model, .. } =
+                comparison;
             let signal = &measurement.signals[*signal];
             let name = signal.quantity.column();
             let (unit, _) = signal.quantity.units();
@@ -100,24 +110,30 @@ impl FinishedFit<'_> {
                 };
             let values = signal.values.iter().copied();
             add_column("measured", "as measured", &mut values.clone().map(finite_value));
-            let with_offset = || model.iter().map(|model| model + offset);
-            add_column("model", "the fitted model, with the offset", &mut with_offset().map(Some));
+            let model_with_offset = || model.iter().map(|model| model + offset);
+            add_column(
+                "model",
+                "the fitted model, with the offset",
+                &mut model_with_offset().map(Some),
+            );
             let residual = values
-                .zip(with_offset())
+                .zip(model_with_offset())
                 .map(|(measurement, model)| finite_value(measurement - model));
             add_column("residual", "measured less model", &mut { residual });
         }
         let mut plan = fit_case.plan.clone();
         plan.model.machine = self.problem.machine(case, &self.x).0;
-        // The starting values of the search are not the fitted values.
-        let free: Vec<&str> = self.problem.free.iter().map(|free| free.parameter.name()).collect();
-        plan.set.retain(|(name, _)| !free.contains(&name.as_str()));
+        // The plan does not store the starting values of the search as constants, because the
+        // fitted values differ from them.
+        let free_names: Vec<&str> =
+            self.problem.free_parameters.iter().map(|free| free.parameter.name()).collect();
+        plan.set.retain(|(name, _)| !free_names.contains(&name.as_str()));
         table.add_metadata(key::PLAN, &plan.to_json());
-        let mut results = json!({ "report": self.report, "spectra": self.spectra(case) });
+        let mut fit_metadata = json!({ "report": self.report, "spectra": self.spectra_json(case) });
         if self.report.follows {
-            results["profiles"] = self.profiles();
+            fit_metadata["profiles"] = self.profiles_json();
         }
-        table.add_metadata(key::FIT, &results);
+        table.add_metadata(key::FIT, &fit_metadata);
         table
     }
 }

@@ -1,8 +1,8 @@
 //! Tolerances of the numbers that are not fitted, and how estimates depend on them.
 //!
-//! An estimate holds for the fixed numbers of its machine. If these are off by d, the free numbers
-//! make up for it as far as they can. Let J be the slopes of the model by the unknowns, K those by
-//! the fixed numbers in standard deviations, W the weights, A = J' W J, and r the residual. To
+//! An estimate is computed with the fixed numbers of its machine. If these have errors d, the free
+//! numbers compensate for them in part. Let J be the slopes of the model by the unknowns, K those
+//! by the fixed numbers in standard deviations, W the weights, A = J' W J, and r the residual. To
 //! first order, unknowns and fixed numbers together have the posterior information [J K]' W [J K] +
 //! diag(0, 1), since d has the covariance 1 before the record. By its Schur complement, with B =
 //! A^-1 J' W K and M = 1 - J A^-1 J' W,
@@ -25,25 +25,25 @@ use super::model::{FitCase, FreeParameter, NormalEquations, Problem, SignalCompa
 use sweep_engine::Diagnostics;
 use sweep_engine::config::{Location, Report as Mistakes};
 
-/// The word that takes numbers without a tolerance of their own as exact.
-const NONE_WORD: &str = "none";
+/// The word among the options by which numbers without a given tolerance are taken as exact.
+const EXACT_NUMBERS_OPTION: &str = "none";
 /// The name of the sensors' gains among the fixed numbers.
 const GAIN_NAME: &str = "gain";
-/// The default standard deviation of a sensor's gain. Basis: an accelerometer without a calibration
-/// of its own. Doubling it doubles what gains add to intervals.
-const GAIN_RATIO: f64 = 0.03;
-/// The step of a derivative by a fixed number, in tolerances. Basis: a relative change of some
-/// 1e-3, as far from rounding as from curvature. Doubling it doubles the derivative's error by
-/// curvature.
-const STEP_TOLERANCES: f64 = 0.02;
-/// The greatest number of values of the slopes by fixed numbers. In longer records every `n`th
-/// sample counts `n` times. Basis: 160 MB. Doubling it doubles the memory.
+/// The default standard deviation of a sensor's gain, relative to the gain. Basis: an accelerometer
+/// that is not calibrated itself. Doubling it doubles what gains add to intervals.
+const DEFAULT_GAIN_TOLERANCE: f64 = 0.03;
+/// The step of the difference quotient by a fixed number, in units of its tolerance. Basis: a
+/// relative change of some 1e-3, as far from rounding as from curvature. Doubling it doubles the
+/// derivative's error by curvature.
+const DERIVATIVE_STEP: f64 = 0.02;
+/// The greatest number of stored derivatives by fixed numbers. In longer records only every `n`th
+/// sample is stored and counts `n` times. Basis: 160 MB. Doubling it doubles the memory.
 const MAX_SLOPE_VALUES: usize = 20_000_000;
 
 /// The endings of the names of lengths that are too short for a tape measure.
-const SHORT_LENGTHS: [&str; 2] = ["clearance_m", "softness_m"];
+const SHORT_LENGTH_SUFFIXES: [&str; 2] = ["clearance_m", "softness_m"];
 
-/// A standard deviation, as a part of the number or in its unit.
+/// The standard deviation of a fixed number, relative to the number or in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FixedTolerance {
     Relative(f64),
@@ -51,30 +51,32 @@ enum FixedTolerance {
 }
 
 impl FixedTolerance {
-    /// Returns the default for numbers of a name and a unit. Basis: masses by a scale; lengths by a
-    /// tape measure along bent sheet, short ones by a caliper; the place of a load by eye; moments
-    /// of inertia from drawings without ribs; springs of a catalogue; hardly more of dampers and
-    /// friction. Doubling one doubles what numbers of its kind add to intervals, unless the record
-    /// limits them.
-    fn by_kind(name: &str, unit: &str) -> Self {
+    /// Returns the default tolerance of a number by its name and unit. Basis: masses by a scale;
+    /// lengths by a tape measure along bent sheet, short ones by a caliper; the place of a load by
+    /// eye; moments of inertia from drawings without ribs; springs from a catalogue; dampers and
+    /// friction are hardly known better. Doubling one doubles what numbers of its kind add to
+    /// intervals, unless the record limits them.
+    fn default_for(name: &str, unit: &str) -> Self {
         match unit {
             "kg" => Self::Relative(0.02),
             "m" if name.ends_with("radius_m") => Self::Relative(0.05),
-            "m" if SHORT_LENGTHS.iter().any(|end| name.ends_with(end)) => Self::Relative(0.1),
+            "m" if SHORT_LENGTH_SUFFIXES.iter().any(|end| name.ends_with(end)) => {
+                Self::Relative(0.1)
+            }
             "m" => Self::Absolute(0.005),
             "kg m^2" | "N/m" => Self::Relative(0.05),
-            // Gravity is known.
+            // The acceleration of gravity is known exactly enough.
             "m/s^2" => Self::Relative(0.0),
             _ => Self::Relative(0.1),
         }
     }
 
-    /// Reads `2%`, or a number in the parameter's unit.
+    /// Parses a percentage such as `2%`, or a number in the parameter's unit.
     fn parse(text: &str) -> Option<Self> {
-        let text = text.trim();
-        let (number, is_percent) = match text.strip_suffix('%') {
+        let trimmed_text = text.trim();
+        let (number, is_percent) = match trimmed_text.strip_suffix('%') {
             Some(number) => (number.trim(), true),
-            None => (text, false),
+            None => (trimmed_text, false),
         };
         let number: f64 = number.parse().ok()?;
         let is_valid = number.is_finite() && number >= 0.0;
@@ -86,10 +88,10 @@ impl FixedTolerance {
     }
 
     /// Returns the standard deviation of a number.
-    fn deviation(self, value: f64) -> f64 {
+    fn standard_deviation(self, value: f64) -> f64 {
         match self {
             Self::Relative(ratio) => ratio * value.abs(),
-            Self::Absolute(size) => size,
+            Self::Absolute(deviation) => deviation,
         }
     }
 }
@@ -97,8 +99,8 @@ impl FixedTolerance {
 /// The fixed numbers of a fit with their tolerances.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FixedNumbers {
-    numbers: Vec<(MachineParameter, f64)>,
-    gain_ratio: f64,
+    tolerances: Vec<(MachineParameter, f64)>,
+    gain_tolerance: f64,
 }
 
 /// The effect of a fixed number's error on the unknowns.
@@ -106,23 +108,23 @@ pub(super) struct FixedNumbers {
 pub(crate) struct FixedInfluence {
     pub(crate) name: String,
     pub(crate) unit: &'static str,
-    /// The standard deviation before the record.
+    /// The standard deviation of the fixed number before the fit.
     pub(crate) tolerance: f64,
-    /// The standard deviation after the record.
+    /// The standard deviation of the fixed number after the fit.
     pub(crate) error: f64,
-    /// The number of the machine; none of a sensor's gain.
+    /// The parameter of the machine; `None` for the gain of a sensor.
     pub(crate) parameter: Option<MachineParameter>,
-    /// The mean change of each unknown by that error, with the errors of other fixed numbers that
-    /// the record leaves open together with it: what knowing the number would take off the
-    /// unknowns' errors.
+    /// The mean change of each unknown by `error`, including the errors of other fixed numbers that
+    /// correlate with it after the fit. Exact knowledge of the number would reduce the errors of
+    /// the unknowns by this change.
     pub(crate) effects: Vec<f64>,
 }
 
-/// Errors of all fixed numbers together, of one standard deviation, that are independent of those
-/// of other directions.
+/// A principal direction of the errors of all fixed numbers: errors of one standard deviation,
+/// which are independent of the errors along the other directions.
 #[derive(Clone, Debug)]
 pub(crate) struct ErrorDirection {
-    /// The changes of numbers of the machine.
+    /// The changes of the machine's numbers.
     pub(crate) changes: Vec<(MachineParameter, f64)>,
     /// The change of each unknown.
     pub(crate) effects: Vec<f64>,
@@ -131,24 +133,24 @@ pub(crate) struct ErrorDirection {
 /// The effects of all fixed numbers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FixedInfluences {
-    /// The strongest dependence of any unknown first.
+    /// The effect of each fixed number, in descending order of the effect on any unknown.
     pub(crate) numbers: Vec<FixedInfluence>,
     /// The addition to the covariance of the unknowns.
     pub(crate) covariance: Vec<Vec<f64>>,
-    /// The principal directions of the errors, those first that move the unknowns most.
+    /// The principal directions of the errors, in descending order of the effect on any unknown.
     pub(crate) directions: Vec<ErrorDirection>,
 }
 
-/// An error of a fixed number of one standard deviation.
+/// The error of one standard deviation of a fixed number, and its effect on the signals.
 struct FixedError {
     influence: FixedInfluence,
-    /// The change of every signal at every sample, or at every `stride`th.
-    change: Vec<Vec<f64>>,
+    /// The change of every signal at every `stride`th sample.
+    signal_changes: Vec<Vec<f64>>,
 }
 
 impl FixedNumbers {
-    /// Reads the tolerances that are given. All other numbers of the machine that are not free have
-    /// those of their kind, unless `none` is among the given.
+    /// Reads the given tolerances. All other numbers of the machine that are not free have default
+    /// tolerances, unless `none` is among the options.
     ///
     /// # Errors
     /// Returns every mistake in the tolerances.
@@ -159,9 +161,9 @@ impl FixedNumbers {
     ) -> Result<Self, Diagnostics> {
         let mistakes = Mistakes::default();
         let mut parameters: Vec<(MachineParameter, FixedTolerance)> = Vec::new();
-        let mut gain: Option<FixedTolerance> = None;
-        let is_none = |text: &&String| text.trim() == NONE_WORD;
-        for text in options.iter().filter(|text| !is_none(text)) {
+        let mut given_gain: Option<FixedTolerance> = None;
+        let is_exact_numbers_option = |text: &&String| text.trim() == EXACT_NUMBERS_OPTION;
+        for text in options.iter().filter(|text| !is_exact_numbers_option(text)) {
             let location = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
             let refuse = |title: String| {
                 let expected = "expected NAME=2% or NAME=0.01 in its unit, gain=3% or none";
@@ -176,14 +178,16 @@ impl FixedNumbers {
                 continue;
             };
             match (name.trim(), tolerance) {
-                (GAIN_NAME, FixedTolerance::Relative(_)) => gain = Some(tolerance),
+                (GAIN_NAME, FixedTolerance::Relative(_)) => given_gain = Some(tolerance),
                 (GAIN_NAME, FixedTolerance::Absolute(_)) => {
                     refuse("a gain's tolerance is a part".to_owned())
                 }
-                (name, _) => match single_numbers(name, case, free) {
+                (name, _) => match find_fixed_numbers(name, case, free) {
                     Ok(numbers) => {
                         if tolerance == FixedTolerance::Relative(0.0)
-                            || numbers.iter().all(|(_, value)| tolerance.deviation(*value) > 0.0)
+                            || numbers
+                                .iter()
+                                .all(|(_, value)| tolerance.standard_deviation(*value) > 0.0)
                         {
                             let numbers = numbers.into_iter();
                             parameters.extend(numbers.map(|(number, _)| (number, tolerance)));
@@ -195,11 +199,11 @@ impl FixedNumbers {
                 },
             }
         }
-        let with_defaults = !options.iter().any(|text| is_none(&text));
-        let default_gain = if with_defaults { GAIN_RATIO } else { 0.0 };
+        let uses_defaults = !options.iter().any(|text| is_exact_numbers_option(&text));
+        let default_gain = if uses_defaults { DEFAULT_GAIN_TOLERANCE } else { 0.0 };
         let fixed_numbers = Self {
-            numbers: fixed_numbers(case, free, &parameters, with_defaults),
-            gain_ratio: gain.map_or(default_gain, |gain| gain.deviation(1.0)),
+            tolerances: numbers_with_tolerances(case, free, &parameters, uses_defaults),
+            gain_tolerance: given_gain.map_or(default_gain, |gain| gain.standard_deviation(1.0)),
         };
         mistakes.finish(Some(fixed_numbers))
     }
@@ -214,84 +218,92 @@ impl FixedNumbers {
         equations: &NormalEquations,
         variances: &[f64],
     ) -> FixedInfluences {
-        let gain_count = if self.gain_ratio > 0.0 { comparisons.len() } else { 0 };
-        let samples: usize = comparisons.iter().map(|comparison| comparison.residual.len()).sum();
+        let gain_count = if self.gain_tolerance > 0.0 { comparisons.len() } else { 0 };
+        let sample_count: usize =
+            comparisons.iter().map(|comparison| comparison.residual.len()).sum();
         let stride =
-            (samples * (self.numbers.len() + gain_count)).div_ceil(MAX_SLOPE_VALUES).max(1);
-        let mut errors = self.machine_errors(problem, x, comparisons, equations, stride);
+            (sample_count * (self.tolerances.len() + gain_count)).div_ceil(MAX_SLOPE_VALUES).max(1);
+        let mut fixed_errors = self.machine_errors(problem, x, comparisons, equations, stride);
         if gain_count > 0 {
-            errors.extend(self.gain_errors(problem, comparisons, equations, stride));
+            fixed_errors.extend(self.gain_errors(problem, comparisons, equations, stride));
         }
-        let inverse_normal = pseudo_inverse(&equations.normal);
-        for FixedError { influence, .. } in &mut errors {
+        let inverse_normal_matrix = pseudo_inverse(&equations.normal_matrix);
+        for FixedError { influence, .. } in &mut fixed_errors {
             influence.effects =
-                inverse_normal.iter().map(|row| dot(row, &influence.effects)).collect();
+                inverse_normal_matrix.iter().map(|row| dot(row, &influence.effects)).collect();
         }
         let Posterior { covariance: posterior_covariance, mean } =
-            compute_posterior(&errors, comparisons, variances, stride);
+            compute_posterior(&fixed_errors, comparisons, variances, stride);
         let mut second_moment = posterior_covariance.clone();
         add_outer(&mut second_moment, &mean, 1.0);
-        let unknowns = problem.unknowns();
-        // The product of B and a vector of errors in standard deviations.
-        let effect_on_unknowns = |by: &[f64]| -> Vec<f64> {
-            let mut effect_on_unknowns = vec![0.0; unknowns];
-            for (FixedError { influence, .. }, by) in errors.iter().zip(by) {
-                effect_on_unknowns
+        let unknowns = problem.unknown_count();
+        // Multiplies B and a vector of errors in standard deviations.
+        let combine_effects = |by: &[f64]| -> Vec<f64> {
+            let mut sum_of_effects = vec![0.0; unknowns];
+            for (FixedError { influence, .. }, component) in fixed_errors.iter().zip(by) {
+                sum_of_effects
                     .iter_mut()
                     .zip(&influence.effects)
-                    .for_each(|(sum, move_by)| *sum += by * move_by);
+                    .for_each(|(sum, effect)| *sum += component * effect);
             }
-            effect_on_unknowns
+            sum_of_effects
         };
-        let total_changes: Vec<Vec<f64>> =
-            second_moment.iter().map(|row| effect_on_unknowns(row)).collect();
+        let changes_by_moment: Vec<Vec<f64>> =
+            second_moment.iter().map(|row| combine_effects(row)).collect();
         let mut covariance = vec![vec![0.0; unknowns]; unknowns];
-        for (FixedError { influence, .. }, total_changes) in errors.iter().zip(&total_changes) {
-            for (row, by) in covariance.iter_mut().zip(&influence.effects) {
-                row.iter_mut().zip(total_changes).for_each(|(sum, change)| *sum += by * change);
+        for (FixedError { influence, .. }, unknown_changes) in
+            fixed_errors.iter().zip(&changes_by_moment)
+        {
+            for (row, effect) in covariance.iter_mut().zip(&influence.effects) {
+                row.iter_mut()
+                    .zip(unknown_changes)
+                    .for_each(|(sum, change)| *sum += effect * change);
             }
         }
-        let strength = |effects: &[f64]| {
+        let strongest_effect = |effects: &[f64]| {
             let effects = effects.iter().enumerate();
-            effects.fold(0.0_f64, |greatest, (k, by)| {
-                greatest.max(by * by / inverse_normal[k][k].max(1e-300))
+            effects.fold(0.0_f64, |greatest, (k, effect)| {
+                greatest.max(effect * effect / inverse_normal_matrix[k][k].max(1e-300))
             })
         };
         let eigen = EigenDecomposition::from_matrix(&second_moment);
-        let direction = |(value, vector): (&f64, &Vec<f64>)| {
-            let size = value.max(0.0).sqrt();
-            let error_components: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
-            let changes = errors.iter().zip(&error_components).filter_map(|(error, by)| {
-                let parameter = error.influence.parameter.clone()?;
-                Some((parameter, by * error.influence.tolerance))
-            });
+        let principal_direction = |(value, vector): (&f64, &Vec<f64>)| {
+            let deviation = value.max(0.0).sqrt();
+            let error_components: Vec<f64> = vector.iter().map(|entry| deviation * entry).collect();
+            let changes =
+                fixed_errors.iter().zip(&error_components).filter_map(|(error, component)| {
+                    let parameter = error.influence.parameter.clone()?;
+                    Some((parameter, component * error.influence.tolerance))
+                });
             ErrorDirection {
                 changes: changes.collect(),
-                effects: effect_on_unknowns(&error_components),
+                effects: combine_effects(&error_components),
             }
         };
         let mut directions: Vec<ErrorDirection> =
-            eigen.values.iter().zip(&eigen.vectors).map(direction).collect();
-        directions.sort_by(|a, b| strength(&b.effects).total_cmp(&strength(&a.effects)));
-        let changes_by_error: Vec<Vec<f64>> =
-            posterior_covariance.iter().map(|row| effect_on_unknowns(row)).collect();
+            eigen.values.iter().zip(&eigen.vectors).map(principal_direction).collect();
+        directions
+            .sort_by(|a, b| strongest_effect(&b.effects).total_cmp(&strongest_effect(&a.effects)));
+        let changes_by_covariance: Vec<Vec<f64>> =
+            posterior_covariance.iter().map(|row| combine_effects(row)).collect();
         let mut numbers: Vec<FixedInfluence> =
-            errors.into_iter().map(|error| error.influence).collect();
+            fixed_errors.into_iter().map(|error| error.influence).collect();
         for (k, influence) in numbers.iter_mut().enumerate() {
-            let ratio = posterior_covariance[k][k].max(0.0).sqrt();
-            influence.error = ratio * influence.tolerance;
-            let effects = influence.effects.iter_mut().zip(&changes_by_error[k]);
-            effects.for_each(|(by, effect_on_unknowns)| {
-                *by = if ratio > 0.0 { effect_on_unknowns / ratio } else { 0.0 }
+            let error_ratio = posterior_covariance[k][k].max(0.0).sqrt();
+            influence.error = error_ratio * influence.tolerance;
+            let effects = influence.effects.iter_mut().zip(&changes_by_covariance[k]);
+            effects.for_each(|(effect, effect_on_unknowns)| {
+                *effect = if error_ratio > 0.0 { effect_on_unknowns / error_ratio } else { 0.0 }
             });
         }
-        numbers.sort_by(|a, b| strength(&b.effects).total_cmp(&strength(&a.effects)));
+        numbers
+            .sort_by(|a, b| strongest_effect(&b.effects).total_cmp(&strongest_effect(&a.effects)));
         FixedInfluences { numbers, covariance, directions }
     }
 
     /// Computes the effect on the signals of an error of one standard deviation of each number of
-    /// the machine, with the change of the normal equations' right side in place of the moves. The
-    /// effect is zero if no machine has the changed number.
+    /// the machine. The field `effects` has the change of the normal equations' right side, not yet
+    /// that of the unknowns. The effect is zero if no valid machine has the changed number.
     fn machine_errors(
         &self,
         problem: &Problem<'_>,
@@ -300,7 +312,7 @@ impl FixedNumbers {
         equations: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
-        let error = |(parameter, tolerance): &(MachineParameter, f64)| FixedError {
+        let unit_error = |(parameter, tolerance): &(MachineParameter, f64)| FixedError {
             influence: FixedInfluence {
                 name: parameter.name().to_owned(),
                 unit: parameter.unit(),
@@ -309,54 +321,61 @@ impl FixedNumbers {
                 parameter: Some(parameter.clone()),
                 effects: vec![0.0; x.len()],
             },
-            change: comparisons
+            signal_changes: comparisons
                 .iter()
                 .map(|comparison| vec![0.0; comparison.residual.len().div_ceil(stride)])
                 .collect(),
         };
-        let mut errors: Vec<FixedError> = self.numbers.iter().map(error).collect();
+        let mut errors: Vec<FixedError> = self.tolerances.iter().map(unit_error).collect();
         for case in 0..problem.cases.len() {
             // A number at an end of its range can change in one direction only.
-            let signed_step = |k: usize| {
+            let allowed_step = |k: usize| {
                 let (mut machine, mut spin) = problem.machine(case, x);
-                apply_change(&self.numbers[k], STEP_TOLERANCES, &mut machine, &mut spin);
-                if machine.violations().is_empty() { STEP_TOLERANCES } else { -STEP_TOLERANCES }
+                apply_change(&self.tolerances[k], DERIVATIVE_STEP, &mut machine, &mut spin);
+                if machine.violations().is_empty() { DERIVATIVE_STEP } else { -DERIVATIVE_STEP }
             };
-            let steps: Vec<f64> = (0..self.numbers.len()).map(signed_step).collect();
-            let case_signals: Vec<usize> =
-                (0..comparisons.len()).filter(|&signal| comparisons[signal].case == case).collect();
-            let reduce = |changes: Vec<Vec<f64>>| {
+            let steps: Vec<f64> = (0..self.tolerances.len()).map(allowed_step).collect();
+            let case_signals: Vec<usize> = (0..comparisons.len())
+                .filter(|&signal| comparisons[signal].case_index == case)
+                .collect();
+            let project_changes = |changes: Vec<Vec<f64>>| {
                 let mut rhs = vec![0.0; x.len()];
-                let mut thinned = Vec::with_capacity(changes.len());
+                let mut thinned_changes = Vec::with_capacity(changes.len());
                 for (change, &signal) in changes.into_iter().zip(&case_signals) {
                     let change = subtract_mean(change).0;
                     let variance = equations.sigma[signal] * equations.sigma[signal];
                     for (rhs, slope) in rhs.iter_mut().zip(&comparisons[signal].slopes) {
                         *rhs += dot(slope, &change) / variance;
                     }
-                    thinned.push(change.into_iter().step_by(stride).collect::<Vec<f64>>());
+                    thinned_changes.push(change.into_iter().step_by(stride).collect::<Vec<f64>>());
                 }
-                (rhs, thinned)
+                (rhs, thinned_changes)
             };
-            let apply = |k: usize, machine: &mut Machine, spin: &mut Spin| {
-                apply_change(&self.numbers[k], steps[k], machine, spin);
+            let apply_step = |k: usize, machine: &mut Machine, spin: &mut Spin| {
+                apply_change(&self.tolerances[k], steps[k], machine, spin);
             };
-            let effects =
-                problem.compute_changes(case, x, comparisons, (steps.len(), apply), reduce);
-            for ((error, effect), step) in errors.iter_mut().zip(effects).zip(&steps) {
+            let projected_changes = problem.compute_changes(
+                case,
+                x,
+                comparisons,
+                (steps.len(), apply_step),
+                project_changes,
+            );
+            for ((error, effect), step) in errors.iter_mut().zip(projected_changes).zip(&steps) {
                 let Some((rhs, changes)) = effect else { continue };
-                let effects = error.influence.effects.iter_mut().zip(rhs);
-                effects.for_each(|(sum, rhs)| *sum += rhs / step);
-                for (change, &signal) in changes.into_iter().zip(&case_signals) {
-                    error.change[signal] = change.into_iter().map(|value| value / step).collect();
+                let unscaled_effects = error.influence.effects.iter_mut().zip(rhs);
+                unscaled_effects.for_each(|(sum, rhs)| *sum += rhs / step);
+                for (thinned_change, &signal) in changes.into_iter().zip(&case_signals) {
+                    error.signal_changes[signal] =
+                        thinned_change.into_iter().map(|value| value / step).collect();
                 }
             }
         }
         errors
     }
 
-    /// Computes the effect of an error of one standard deviation of each sensor's gain, with the
-    /// change of the normal equations' right side in place of the moves.
+    /// Computes the effect of an error of one standard deviation of each sensor's gain. The field
+    /// `effects` has the change of the normal equations' right side, not yet that of the unknowns.
     fn gain_errors(
         &self,
         problem: &Problem<'_>,
@@ -364,23 +383,24 @@ impl FixedNumbers {
         equations: &NormalEquations,
         stride: usize,
     ) -> Vec<FixedError> {
-        let error = |(k, ((.., signal), comparison)): (
+        let gain_error = |(k, ((.., signal), comparison)): (
             usize,
             ((usize, usize, &Signal), &SignalComparison),
         )| {
             let variance = equations.sigma[k] * equations.sigma[k];
-            let motion = signal.samples().map(|(row, _)| self.gain_ratio * comparison.model[row]);
-            let motion = subtract_mean(motion.collect()).0;
-            let mut change: Vec<Vec<f64>> = comparisons
+            let gain_motion =
+                signal.samples().map(|(row, _)| self.gain_tolerance * comparison.model_values[row]);
+            let motion = subtract_mean(gain_motion.collect()).0;
+            let mut signal_changes: Vec<Vec<f64>> = comparisons
                 .iter()
                 .map(|comparison| vec![0.0; comparison.residual.len().div_ceil(stride)])
                 .collect();
-            change[k] = motion.iter().copied().step_by(stride).collect();
+            signal_changes[k] = motion.iter().copied().step_by(stride).collect();
             let influence = FixedInfluence {
                 name: format!("{GAIN_NAME} of {}", signal.quantity.column()),
                 unit: "",
-                tolerance: self.gain_ratio,
-                error: self.gain_ratio,
+                tolerance: self.gain_tolerance,
+                error: self.gain_tolerance,
                 parameter: None,
                 effects: comparison
                     .slopes
@@ -388,19 +408,19 @@ impl FixedNumbers {
                     .map(|slope| dot(slope, &motion) / variance)
                     .collect(),
             };
-            FixedError { influence, change }
+            FixedError { influence, signal_changes }
         };
-        problem.signals().zip(comparisons).enumerate().map(error).collect()
+        problem.signals().zip(comparisons).enumerate().map(gain_error).collect()
     }
 }
 
-/// The errors of fixed numbers after the record, in standard deviations before it.
+/// The distribution of the fixed numbers' errors after the fit, in units of their tolerances.
 struct Posterior {
     covariance: Vec<Vec<f64>>,
     mean: Vec<f64>,
 }
 
-/// Computes the errors of fixed numbers after the record.
+/// Computes the distribution of the fixed numbers' errors after the fit.
 fn compute_posterior(
     errors: &[FixedError],
     comparisons: &[SignalComparison],
@@ -409,27 +429,32 @@ fn compute_posterior(
 ) -> Posterior {
     let weights: Vec<f64> =
         variances.iter().map(|variance| (stride as f64 / variance).sqrt()).collect();
-    let residual: Vec<f64> = comparisons
+    let weighted_residual: Vec<f64> = comparisons
         .iter()
         .zip(&weights)
         .flat_map(|(comparison, weight)| {
             comparison.residual.iter().step_by(stride).map(move |residual| weight * residual)
         })
         .collect();
-    // The part of each change for which the unknowns do not compensate.
-    let uncompensated = |error: &FixedError| -> Vec<f64> {
-        let mut samples = Vec::with_capacity(residual.len());
-        for ((change, comparison), weight) in error.change.iter().zip(comparisons).zip(&weights) {
-            let mut change = change.clone();
-            for (slope, by) in comparison.slopes.iter().zip(&error.influence.effects) {
+    // Computes the part of a number's effect for which the unknowns do not compensate.
+    let uncompensated_change = |error: &FixedError| -> Vec<f64> {
+        let mut weighted_samples = Vec::with_capacity(weighted_residual.len());
+        for ((change, comparison), weight) in
+            error.signal_changes.iter().zip(comparisons).zip(&weights)
+        {
+            let mut remaining_change = change.clone();
+            for (slope, effect) in comparison.slopes.iter().zip(&error.influence.effects) {
                 let slope = slope.iter().step_by(stride);
-                change.iter_mut().zip(slope).for_each(|(change, slope)| *change -= by * slope);
+                remaining_change
+                    .iter_mut()
+                    .zip(slope)
+                    .for_each(|(change, slope)| *change -= effect * slope);
             }
-            samples.extend(change.iter().map(|change| weight * change));
+            weighted_samples.extend(remaining_change.iter().map(|change| weight * change));
         }
-        samples
+        weighted_samples
     };
-    let uncompensated_parts: Vec<Vec<f64>> = errors.iter().map(uncompensated).collect();
+    let uncompensated_parts: Vec<Vec<f64>> = errors.iter().map(uncompensated_change).collect();
     let mut information = vec![vec![0.0; errors.len()]; errors.len()];
     for i in 0..errors.len() {
         for j in 0..=i {
@@ -441,29 +466,29 @@ fn compute_posterior(
     }
     let covariance = pseudo_inverse(&information);
     let scores: Vec<f64> =
-        uncompensated_parts.iter().map(|samples| dot(samples, &residual)).collect();
+        uncompensated_parts.iter().map(|samples| dot(samples, &weighted_residual)).collect();
     let mean = covariance.iter().map(|row| dot(row, &scores)).collect();
     Posterior { covariance, mean }
 }
 
-/// Changes a number by a multiple of its tolerance.
+/// Adds a multiple of its tolerance to a number of the machine.
 fn apply_change(
     (parameter, tolerance): &(MachineParameter, f64),
-    count: f64,
+    multiple: f64,
     machine: &mut Machine,
     spin: &mut Spin,
 ) {
     if let Some(value) = parameter.get(machine, spin) {
-        parameter.set(machine, spin, value + count * tolerance);
+        parameter.set(machine, spin, value + multiple * tolerance);
     }
 }
 
-/// Returns the fixed numbers of a name with their values: one, or one for each element if the name
-/// stands for elements that differ.
+/// Returns the fixed numbers that a name means, with their values: a single one, or one for each
+/// element if the elements have different values.
 ///
 /// # Errors
-/// Returns the reason why the name has no fixed number.
-fn single_numbers(
+/// Returns the reason why the name means no fixed number.
+fn find_fixed_numbers(
     name: &str,
     case: &FitCase,
     free: &[FreeParameter],
@@ -472,7 +497,7 @@ fn single_numbers(
     let spin = case.spin();
     let parameter = MachineParameter::find(name, machine, spin)
         .map_err(|error| format!("`{name}` has no tolerance: {error}"))?;
-    if !is_fixed_kind(&parameter) {
+    if !can_be_fixed(&parameter) {
         return Err(format!("`{name}` is no number of the machine"));
     }
     let single_names = parameter.single_names(machine);
@@ -497,56 +522,56 @@ fn single_numbers(
     }
 }
 
-/// Whether a parameter is a number of the machine.
-fn is_fixed_kind(parameter: &MachineParameter) -> bool {
+/// Returns whether a parameter is a number of the machine, neither of the spin nor of the window.
+fn can_be_fixed(parameter: &MachineParameter) -> bool {
     !matches!(parameter.target(), Target::Spin | Target::Window(_))
 }
 
-/// Returns the numbers of a machine that have a tolerance. A number that several elements share is
-/// one number, because they are of one batch.
-fn fixed_numbers(
+/// Returns the fixed numbers of a machine with their tolerances. A value that several elements
+/// share is one number, because elements of one batch have one error.
+fn numbers_with_tolerances(
     case: &FitCase,
     free: &[FreeParameter],
-    given: &[(MachineParameter, FixedTolerance)],
-    with_defaults: bool,
+    given_tolerances: &[(MachineParameter, FixedTolerance)],
+    uses_defaults: bool,
 ) -> Vec<(MachineParameter, f64)> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
-    let single_names = |parameter: &MachineParameter| parameter.single_names(machine);
-    let mut free_names: Vec<_> =
-        free.iter().flat_map(|free| single_names(&free.parameter)).collect();
+    let single_names_of = |parameter: &MachineParameter| parameter.single_names(machine);
+    let mut names_with_value: Vec<_> =
+        free.iter().flat_map(|free| single_names_of(&free.parameter)).collect();
     let mut numbers = Vec::new();
-    // The last tolerance of a number holds.
-    let given = given.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
-    let fixed_parameters =
-        || MachineParameter::all(machine, spin).into_iter().filter(is_fixed_kind);
-    let with_several_numbers =
+    // The last one of several given tolerances of a number applies.
+    let given_in_reverse =
+        given_tolerances.iter().rev().map(|(parameter, tolerance)| (parameter.clone(), *tolerance));
+    let fixed_parameters = || MachineParameter::all(machine, spin).into_iter().filter(can_be_fixed);
+    let parameters_of_several_numbers =
         fixed_parameters().filter(|parameter| parameter.target().has_several_numbers());
-    let with_single_number =
+    let parameters_of_one_number =
         fixed_parameters().filter(|parameter| !parameter.target().has_several_numbers());
-    // A number with its default value, such as 0, belongs to a part that the machine does not have.
+    // A number with its default value, such as 0, belongs to an element that the machine lacks.
     let is_present = |parameter: &MachineParameter| {
         parameter.default_value().is_none_or(|value| parameter.get(machine, spin) != Some(value))
     };
-    let by_kind = |parameter: MachineParameter| {
-        let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());
+    let with_default_tolerance = |parameter: MachineParameter| {
+        let tolerance = FixedTolerance::default_for(parameter.name(), parameter.unit());
         (parameter, tolerance)
     };
-    let defaults = with_several_numbers
-        .chain(with_single_number)
+    let default_tolerances = parameters_of_several_numbers
+        .chain(parameters_of_one_number)
         .filter(is_present)
-        .map(by_kind)
-        .filter(|_| with_defaults);
-    for (parameter, tolerance) in given.chain(defaults) {
-        let names = single_names(&parameter);
-        if names.iter().any(|part| free_names.contains(part)) {
+        .map(with_default_tolerance)
+        .filter(|_| uses_defaults);
+    for (parameter, tolerance) in given_in_reverse.chain(default_tolerances) {
+        let names = single_names_of(&parameter);
+        if names.iter().any(|single_name| names_with_value.contains(single_name)) {
             continue;
         }
         let Some(value) = parameter.get(machine, spin) else { continue };
-        let size = tolerance.deviation(value);
-        free_names.extend(names);
-        if size > 0.0 {
-            numbers.push((parameter, size));
+        let deviation = tolerance.standard_deviation(value);
+        names_with_value.extend(names);
+        if deviation > 0.0 {
+            numbers.push((parameter, deviation));
         }
     }
     numbers

@@ -12,8 +12,8 @@ use sweep_engine::config::section::format_count;
 use sweep_results::nearest_name;
 use washer_model::Channel;
 
-/// The least number of samples of a column. Basis: fewer do not determine their noise. Doubling it
-/// refuses shorter records.
+/// The least number of samples of a column. Basis: fewer samples do not determine the noise.
+/// Doubling it refuses shorter records.
 const MIN_SAMPLES: usize = 16;
 /// The beginning of the names of the nonlinear model's channels in a file of `sweep trace`.
 const TRACE_PREFIX: &str = "nonlinear_";
@@ -24,9 +24,9 @@ pub(super) const MAX_ROW_SPACING_S: f64 = 0.2;
 /// of it; every evaluation of a fit integrates the whole run. Doubling it doubles the time that a
 /// stray row can cost before it is seen.
 pub(super) const MAX_RUN_S: f64 = 3600.0;
-/// The greatest part of its greatest speed at which a run counts as one from rest. Basis: forces of
-/// an unbalance grow with the square of the speed, so those at a tenth are a hundredth of the
-/// greatest. Doubling it lets a run begin with four times that.
+/// The greatest ratio of the first speed to the greatest one at which a run counts as one from
+/// rest. Basis: forces of an unbalance grow with the square of the speed, so those at a tenth are a
+/// hundredth of the greatest. Doubling it accepts runs that begin with four times such forces.
 pub(super) const REST_SPEED_RATIO: f64 = 0.1;
 
 /// The length of a day (s).
@@ -34,17 +34,18 @@ const DAY_S: f64 = 86_400.0;
 /// The greatest acceleration of a drum (rpm/s). Basis: a direct drive of 40 N m on a drum of
 /// 0.4 kg m^2. Doubling it leaves drop-outs of a tachometer at twice the speed in the record.
 const MAX_ACCELERATION_RPM_PER_S: f64 = 1000.0;
-/// The number of a tachometer's usual steps between samples beyond which speeds about a zero are no
-/// noise. Basis: the sizes of two samples of white noise add up to as much once in a million.
+/// The change of speed about a zero that noise explains, in units of the usual change between
+/// samples. Basis: the sizes of two samples of white noise add up to as much once in a million.
 /// Doubling it leaves drop-outs at the slowest speeds of a coarse tachometer in the record.
 const NOISE_STEPS: f64 = 10.0;
 
 /// The quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SignalQuantity {
-    /// A channel, its rate or its acceleration (0, 1, 2).
+    /// A channel with the order of its derivative: 0 for the motion itself, 1 for its rate, 2 for
+    /// its acceleration.
     Motion(Channel, usize),
-    /// The force on the cabinet along c1, c2 or c3 (0, 1, 2).
+    /// The force on the cabinet, with the index of its axis: 0 for c1, 1 for c2, 2 for c3.
     CabinetForce(usize),
 }
 
@@ -57,7 +58,8 @@ impl SignalQuantity {
         motion_quantities.chain((0..3).map(Self::CabinetForce))
     }
 
-    /// Returns the unit, and the one in which it is measured by mistake, with that one's size.
+    /// Returns the unit of the quantity, and the unit that is recorded by mistake, with the factor
+    /// between them.
     pub(crate) fn units(self) -> (String, Option<(&'static str, f64)>) {
         /// Standard gravity, m/s^2 (CGPM 1901): the unit g of loggers.
         const G: f64 = 9.806_65;
@@ -84,7 +86,8 @@ impl SignalQuantity {
         }
     }
 
-    /// Returns the quantity of a column of this name. A place or an angle may go without its unit.
+    /// Returns the quantity that a column's name means. Names of displacements and angles may omit
+    /// the unit.
     fn from_name(name: &str) -> Option<Self> {
         let has_name = |quantity: &Self| match quantity {
             Self::Motion(channel, 0) if channel.name() == name => true,
@@ -131,19 +134,18 @@ pub(crate) struct Measurement {
     /// The reading of a clock that does not start with the run (s), at the first row. Times are
     /// counted from it.
     pub(crate) clock_start_s: Option<f64>,
-    /// The clock time of the first row as it stands in the file, if times are not numbers.
+    /// The clock time of the first row as the file has it, if times are not numbers.
     first_clock_time: Option<String>,
     /// The time intervals without rows (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
-    /// Notes on the parts of the file that were read otherwise than they stand, or not at all.
+    /// Notes on the parts of the file that were converted or left out.
     pub(crate) notes: Vec<String>,
     /// The names of the columns in the file.
     pub(crate) headers: Vec<String>,
 }
 
 impl Measurement {
-    /// Reads a file. `names_by_header` has headers of its columns with the names of their
-    /// quantities.
+    /// Reads a file. `names_by_header` pairs headers of columns with the names of their quantities.
     ///
     /// # Errors
     /// Returns every mistake in the file, with its location.
@@ -183,14 +185,15 @@ impl Measurement {
         let is_after_run = first_s > grid_end_s.max(last_s - first_s) && self.begins_at_rest();
         if first_s > 0.0 && (last_s > MAX_RUN_S || is_after_run) {
             self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
-            let edges = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.pulse_times_s);
-            edges.for_each(|pulse_time_s| *pulse_time_s -= first_s);
-            self.gaps_s = find_gaps(&self.time_s);
+            let pulse_times = self.pulses.iter_mut().flat_map(|pulses| &mut pulses.pulse_times_s);
+            pulse_times.for_each(|pulse_time_s| *pulse_time_s -= first_s);
+            self.gaps_s = find_time_gaps(&self.time_s);
             self.clock_start_s = Some(first_s);
         }
     }
 
-    /// Returns the reading of a clock that does not start with the run, as messages show it.
+    /// Returns the time that the clock shows at the first row, as messages print it, if the clock
+    /// does not start with the run.
     pub(crate) fn clock_start(&self) -> Option<String> {
         let start_s = self.clock_start_s?;
         Some(self.first_clock_time.clone().unwrap_or_else(|| format!("{start_s} s")))
@@ -216,7 +219,7 @@ impl Measurement {
     }
 
     /// Returns whether a column may have this name.
-    pub(crate) fn is_name(name: &str) -> bool {
+    pub(crate) fn is_known_name(name: &str) -> bool {
         find_known_name(name).is_some()
     }
 
@@ -246,12 +249,12 @@ fn all_names() -> Vec<String> {
     names.chain(["time_s", "speed_rpm", "tacho_pulses", "tacho_count"].map(str::to_owned)).collect()
 }
 
-/// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
+/// Returns the mistake that a column's name is misspelled, if it is near the name of a channel.
 fn find_misspelling(column: &ListColumn) -> Option<Diagnostic> {
-    // Other words, such as drum, are near many names; names of channels have underscores.
+    // Words without underscores, such as drum, are near many names, but name no channel.
     let names = all_names();
-    let is_written_so = column.header.contains('_');
-    nearest_name(&column.header, names.iter().map(String::as_str)).filter(|_| is_written_so)?;
+    let has_underscore = column.header.contains('_');
+    nearest_name(&column.header, names.iter().map(String::as_str)).filter(|_| has_underscore)?;
     let title = format!("the column `{}` does not name a channel", column.header);
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
@@ -259,12 +262,13 @@ fn find_misspelling(column: &ListColumn) -> Option<Diagnostic> {
     Some(refusal.with_nearest_name(&column.header, names.iter().map(String::as_str)))
 }
 
-/// Converts the table to a measurement, and reports its mistakes.
+/// Converts a table to a measurement, and reports the mistakes in it.
 fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measurement {
     let clock = table.columns.iter_mut().find(|column| column.name.value == "time_s");
     let passes_midnight = clock.is_some_and(|clock| continue_past_midnight(&mut clock.values));
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
-    let first_row = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
+    let first_row_of_run =
+        clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
     // A file of `sweep trace` counts as a measurement of its nonlinear motion.
     let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACE_PREFIX));
     let mut notes = if is_trace { Vec::new() } else { table.notes() };
@@ -275,12 +279,12 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
     let mut measurement = Measurement {
         name,
-        rows_before_start: first_row,
+        rows_before_start: first_row_of_run,
         notes,
         headers,
         ..Measurement::default()
     };
-    let mut known_names: Vec<&str> = Vec::new();
+    let mut names_so_far: Vec<&str> = Vec::new();
     let mut pulse_columns: Vec<(&ListColumn, (PulseSignal, u32))> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
@@ -290,12 +294,12 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
         }
         let name = column.name.value.as_str();
         let location = &column.name.location;
-        if known_names.contains(&name) {
+        if names_so_far.contains(&name) {
             let title = format!("the column `{name}` is given twice");
             report.push(Diagnostic::new(title).at_location(location, "expected each column once"));
             continue;
         }
-        known_names.push(name);
+        names_so_far.push(name);
         if let Some(row) = column.values.iter().position(|value| value.is_infinite()) {
             report.push_with(|sources| {
                 let title = format!("`{name}` is infinite in row {}", row + 1);
@@ -304,26 +308,26 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
                     .at_location(&table.locate(sources, column.index, row), expected)
             });
         }
-        let values = &column.values[first_row..];
-        let samples = values.iter().filter(|value| !value.is_nan()).count();
+        let values = &column.values[first_row_of_run..];
+        let sample_count = values.iter().filter(|value| !value.is_nan()).count();
         match (name, SignalQuantity::from_name(name)) {
             ("time_s", _) => {
                 measurement.time_s = values.to_vec();
-                measurement.first_clock_time = clock_time(&table, column, first_row, report);
+                measurement.first_clock_time = clock_time(&table, column, first_row_of_run, report);
                 check_times(&table, column, report);
             }
             ("speed_rpm", _) => measurement.speed_rpm = Some(values.to_vec()),
-            (_, Some(_)) if samples >= MIN_SAMPLES && is_constant(values) => {
+            (_, Some(_)) if sample_count >= MIN_SAMPLES && is_constant(values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(
                     Diagnostic::new(title).at_location(location, "expected what a sensor measured"),
                 );
             }
-            (_, Some(quantity)) if samples >= MIN_SAMPLES => {
+            (_, Some(quantity)) if sample_count >= MIN_SAMPLES => {
                 measurement.signals.push(Signal { quantity, values: values.to_vec() });
             }
             (_, Some(_)) => {
-                let title = format!("the column `{name}` has {samples} samples");
+                let title = format!("the column `{name}` has {sample_count} samples");
                 report.push(
                     Diagnostic::new(title)
                         .at_location(location, format!("expected {MIN_SAMPLES} at least")),
@@ -335,25 +339,25 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
         }
     }
     let is_complete = report.is_clean();
-    let missing = [
-        ("time_s", !known_names.contains(&"time_s")),
+    let missing_columns = [
+        ("time_s", !names_so_far.contains(&"time_s")),
         ("any channel", measurement.signals.is_empty()),
     ];
-    for (name, is_missing) in missing {
+    for (name, is_missing) in missing_columns {
         if is_complete && is_missing {
             let title = format!("{} has no column of {name}", measurement.name);
             let help = "expected time_s, and channels of `sweep trace` with their units, as in \
                         tub_front_y_m_per_s2";
             let refusal = Diagnostic::new(title).with_help(help);
-            let unknown = table.columns.iter().find(|column| !column.is_known);
-            let naming = unknown.map(|column| {
+            let unknown_column = table.columns.iter().find(|column| !column.is_known);
+            let naming_help = unknown_column.map(|column| {
                 format!(
                     "say what a column holds: --column '{}=tub_front_y_m_per_s2', or [columns] in \
                      the grid file",
                     column.header
                 )
             });
-            report.push(naming.into_iter().fold(refusal, Diagnostic::with_help));
+            report.push(naming_help.into_iter().fold(refusal, Diagnostic::with_help));
         }
     }
     for (column, kind) in pulse_columns {
@@ -363,29 +367,31 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
     }
     remove_drop_outs(&mut measurement, |row| {
         let clock = table.columns.iter().find(|column| column.name.value == "time_s");
-        clock.and_then(|clock| clock_time(&table, clock, first_row + row, report))
+        clock.and_then(|clock| clock_time(&table, clock, first_row_of_run + row, report))
     });
-    measurement.gaps_s = find_gaps(&measurement.time_s);
+    measurement.gaps_s = find_time_gaps(&measurement.time_s);
     measurement
 }
 
-/// Adds a day to the times after each midnight, where a clock falls by a day less at most a run.
-/// Returns whether there is one.
+/// Adds a day to the times after each midnight, and returns whether there is a midnight. A clock
+/// passes midnight where its time falls by at most a day, and by at least a day less the longest
+/// run.
 fn continue_past_midnight(times: &mut [f64]) -> bool {
-    let mut midnights_s = 0.0;
-    let mut last_s = f64::NEG_INFINITY;
+    let mut passed_midnights_s = 0.0;
+    let mut latest_s = f64::NEG_INFINITY;
     for time_s in times {
-        let fall_s = last_s - (*time_s + midnights_s);
+        let fall_s = latest_s - (*time_s + passed_midnights_s);
         if fall_s > DAY_S - MAX_RUN_S && fall_s <= DAY_S {
-            midnights_s += DAY_S;
+            passed_midnights_s += DAY_S;
         }
-        *time_s += midnights_s;
-        last_s = last_s.max(*time_s);
+        *time_s += passed_midnights_s;
+        latest_s = latest_s.max(*time_s);
     }
-    midnights_s > 0.0
+    passed_midnights_s > 0.0
 }
 
-/// Returns the clock time of a row, if the file has clock times: as it stands in a file of text.
+/// Returns the clock time of a row, if the file has clock times. A time in a text file is returned
+/// as the file has it.
 fn clock_time(
     table: &NumberTable,
     column: &ListColumn,
@@ -399,31 +405,36 @@ fn clock_time(
 /// Removes drop-outs from the speeds, with a note. `clock_time` returns the clock time of a row.
 fn remove_drop_outs(measurement: &mut Measurement, clock_time: impl Fn(usize) -> Option<String>) {
     let Some(speed_rpm) = &mut measurement.speed_rpm else { return };
-    let rows = find_drop_outs(&measurement.time_s, speed_rpm);
-    let Some(first_row) = rows.first() else { return };
+    let drop_out_rows = find_drop_outs(&measurement.time_s, speed_rpm);
+    let Some(first_row) = drop_out_rows.first() else { return };
     let first_time =
         clock_time(*first_row).unwrap_or_else(|| format!("{} s", measurement.time_s[*first_row]));
-    let samples = format_count(rows.len(), "sample");
-    let [verb, prefix] = if rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
-    let note = format!("{samples} of speed_rpm {verb} to zero, {prefix}at {first_time}: left out");
+    let sample_text = format_count(drop_out_rows.len(), "sample");
+    let [verb, prefix] =
+        if drop_out_rows.len() == 1 { ["drops", ""] } else { ["drop", "the first "] };
+    let note =
+        format!("{sample_text} of speed_rpm {verb} to zero, {prefix}at {first_time}: left out");
     measurement.notes.push(note);
-    rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
+    drop_out_rows.into_iter().for_each(|row| speed_rpm[row] = f64::NAN);
 }
 
-/// Returns the rows of a tachometer's drop-outs: zeros between two speeds between which no drum
-/// could have stopped and started again in time. At a standstill speeds approach zero instead.
+/// Returns the rows of a tachometer's drop-outs. A drop-out is a zero between two speeds, between
+/// which no drum could have stopped and started again. At a standstill speeds approach zero
+/// instead.
 fn find_drop_outs(time_s: &[f64], speed_rpm: &[f64]) -> Vec<usize> {
     let is_running = |row: &usize| !speed_rpm[*row].is_nan() && speed_rpm[*row] != 0.0;
     let rows = 0..time_s.len().min(speed_rpm.len());
     let running: Vec<usize> = rows.filter(is_running).collect();
-    let steps = running.windows(2).map(|pair| (speed_rpm[pair[1]] - speed_rpm[pair[0]]).abs());
-    let step_rpm = quantile(steps.filter(|step| *step > 0.0), 0.5).unwrap_or_default();
+    let speed_steps_rpm =
+        running.windows(2).map(|pair| (speed_rpm[pair[1]] - speed_rpm[pair[0]]).abs());
+    let usual_step_rpm =
+        quantile(speed_steps_rpm.filter(|step| *step > 0.0), 0.5).unwrap_or_default();
     let mut zero_rows = Vec::new();
     for pair in running.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         let change_rpm = speed_rpm[before].abs() + speed_rpm[after].abs();
-        let possible_rpm = MAX_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
-        if change_rpm > possible_rpm + NOISE_STEPS * step_rpm {
+        let possible_change_rpm = MAX_ACCELERATION_RPM_PER_S * (time_s[after] - time_s[before]);
+        if change_rpm > possible_change_rpm + NOISE_STEPS * usual_step_rpm {
             zero_rows.extend((before + 1..after).filter(|row| speed_rpm[*row] == 0.0));
         }
     }
@@ -445,8 +456,8 @@ fn read_pulses(
         report.push(Diagnostic::new(title).at_location(&column.name.location, expected));
         return;
     }
-    let counted_name = name.replace("pulses", "count");
-    let voltage_name = name.replace("count_per_row", "pulses").replace("count", "pulses");
+    let count_column_name = name.replace("pulses", "count");
+    let voltage_column_name = name.replace("count_per_row", "pulses").replace("count", "pulses");
     let (title, expected, row) = match Pulses::read(
         &measurement.time_s,
         &column.values[measurement.rows_before_start..],
@@ -460,7 +471,7 @@ fn read_pulses(
             format!("the column `{name}` has {}", format_count(count, "pulse")),
             format!(
                 "expected three at least: a signal that rises through half of its range once \
-                     a pulse; the column of a counter is `{counted_name}`"
+                     a pulse; the column of a counter is `{count_column_name}`"
             ),
             None,
         ),
@@ -480,7 +491,7 @@ fn read_pulses(
             format!("the count `{name}` falls in row {}", measurement.rows_before_start + row + 1),
             format!(
                 "expected a count that rises, or starts again at 0 after 65536 or 4294967296; \
-                     the column of a voltage is `{voltage_name}`"
+                     the column of a voltage is `{voltage_column_name}`"
             ),
             Some(row),
         ),
@@ -502,8 +513,8 @@ fn read_pulses(
 /// Returns whether all samples are equal.
 fn is_constant(values: &[f64]) -> bool {
     let mut samples = values.iter().filter(|value| !value.is_nan());
-    let first = samples.next();
-    samples.all(|value| Some(value) == first)
+    let first_sample = samples.next();
+    samples.all(|value| Some(value) == first_sample)
 }
 
 /// Checks the column of times. Only the first row with each mistake is reported, because often all
@@ -511,10 +522,10 @@ fn is_constant(values: &[f64]) -> bool {
 fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
     let values = &column.values;
     let mut last_s = f64::NEG_INFINITY;
-    let mut reported = [false; 4];
+    let mut reported_mistakes = [false; 4];
     let usual_step_s = usual_step(values).unwrap_or_default();
     for (row, &time_s) in values.iter().enumerate() {
-        let (mistake, description) = match time_s {
+        let (mistake_index, description) = match time_s {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
             _ if time_s == last_s => (3, format!("two rows have the same time, {time_s} s")),
             _ if time_s < last_s => (1, format!("time goes back: {time_s} s after {last_s} s")),
@@ -527,7 +538,7 @@ fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
             }
         };
         last_s = last_s.max(time_s);
-        if std::mem::replace(&mut reported[mistake], true) {
+        if std::mem::replace(&mut reported_mistakes[mistake_index], true) {
             continue;
         }
         report.push_with(|sources| {
@@ -536,16 +547,16 @@ fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
                 .at_location(&table.locate(sources, column.index, row), expected)
         });
     }
-    if reported == [false; 4] {
+    if reported_mistakes == [false; 4] {
         refuse_long_run(table, column, report);
     }
 }
 
 /// Refuses a record of a longer run than is simulated, at the row after its longest gap.
 fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
-    let values = &column.values;
-    let run_start = values.partition_point(|time_s| *time_s < 0.0);
-    let times = &values[run_start..];
+    let all_times = &column.values;
+    let run_start = all_times.partition_point(|time_s| *time_s < 0.0);
+    let times = &all_times[run_start..];
     let Some((first_s, last_s)) = times.first().zip(times.last()) else { return };
     let length_s = last_s - first_s;
     if length_s <= MAX_RUN_S {
@@ -555,7 +566,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     let Some(row) = (1..times.len()).max_by(|a, b| gap_s(*a).total_cmp(&gap_s(*b))) else {
         return;
     };
-    // Two such records may be joined: half of the length is not needed for a gap to be the cause.
+    // A gap of a tenth of the length counts as the cause, because a record may have several.
     let title = if gap_s(row) > 0.1 * length_s {
         format!("time jumps by {} s, from {} to {} s", gap_s(row), times[row - 1], times[row])
     } else {
@@ -571,13 +582,13 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     });
 }
 
-/// Returns the usual distance of two rows: the median.
+/// Returns the median distance of neighbouring rows.
 pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
     quantile(time_s.windows(2).map(|pair| pair[1] - pair[0]), 0.5)
 }
 
-/// Returns the time intervals without rows, which are longer than twenty usual distances of rows.
-fn find_gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
+/// Returns the time intervals without rows. They are longer than twenty usual distances of rows.
+fn find_time_gaps(time_s: &[f64]) -> Vec<[f64; 2]> {
     let Some(usual_step_s) = usual_step(time_s) else { return Vec::new() };
     let gaps = time_s.windows(2).filter(|pair| pair[1] - pair[0] > 20.0 * usual_step_s);
     gaps.map(|pair| [pair[0], pair[1]]).collect()
@@ -608,10 +619,11 @@ mod tests {
     #[test]
     fn a_file_of_trace_is_its_nonlinear_motion() {
         let names = ["time_s", "nonlinear_tub_yaw", "linear_tub_yaw", "min_gap_nonlinear_m"];
-        let column = |name: &str| {
+        let column_of_numbers = |name: &str| {
             (name.to_owned(), (0..20).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>())
         };
-        let measurement = Measurement::from_columns(names.map(column).to_vec(), &[]).unwrap();
+        let measurement =
+            Measurement::from_columns(names.map(column_of_numbers).to_vec(), &[]).unwrap();
         let columns: Vec<String> =
             measurement.signals.iter().map(|signal| signal.quantity.column()).collect();
         assert_eq!(columns, ["tub_yaw_rad"]);
@@ -620,14 +632,14 @@ mod tests {
     #[test]
     fn mistakes_have_their_places() {
         let text = refusal_text("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n0.05,5\n");
-        for said in [
+        for expected_part in [
             "does not name a channel",
             "did you mean `tub_front_y_m",
             "two rows have the same time, 0.1 s",
             "time goes back: 0.05 s after 0.1 s",
             "without its time",
         ] {
-            assert!(text.contains(said), "{said}: {text}");
+            assert!(text.contains(expected_part), "{expected_part}: {text}");
         }
         assert!(text.contains(":4:") && text.contains(":5:"), "{text}");
         assert!(refusal_text("time_s,tub_yaw_rad\n0,1\n1,\n").contains("has 1 samples"));
@@ -638,7 +650,7 @@ mod tests {
         assert!(refusal_text("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
         let rows: String = (0..20).map(|k| format!("{},1\n", 0.01 * f64::from(k))).collect();
         assert!(refusal_text(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
-        // Milliseconds: once, not once a row.
+        // Times in milliseconds are reported once, not once for each row.
         let rows: String = (0..20).map(|k| format!("{},{k}\n", 2 * k)).collect();
         let text = refusal_text(&format!("time_s,tub_yaw\n{rows}"));
         assert_eq!(text.matches("rows are 2 s apart: are these ms?").count(), 1, "{text}");
@@ -646,61 +658,67 @@ mod tests {
 
     #[test]
     fn a_run_that_is_too_long_to_simulate_is_refused_at_its_longest_gap() {
-        let file_text = |times: &mut dyn Iterator<Item = f64>| -> String {
+        let csv_of_times = |times: &mut dyn Iterator<Item = f64>| -> String {
             let rows = times.enumerate().map(|(k, time_s)| format!("{time_s},{k}\n"));
             "time_s,tub_yaw\n".to_owned() + &rows.collect::<String>()
         };
         let steady_times = || (0..200).map(|k| 0.01 * f64::from(k));
-        let with_stray_time = file_text(&mut steady_times().chain([1e5]));
-        let text = refusal_text(&with_stray_time);
+        let csv_with_stray_time = csv_of_times(&mut steady_times().chain([1e5]));
+        let text = refusal_text(&csv_with_stray_time);
         assert!(text.contains("time jumps by 99998.01 s, from 1.99 to 100000 s"), "{text}");
         assert!(text.contains(":202:1") && text.contains("at most 3600 s"), "{text}");
-        let with_gap =
-            file_text(&mut steady_times().chain(steady_times().map(|time_s| 1e4 + time_s)));
-        assert!(refusal_text(&with_gap).contains(":202:1"), "{}", refusal_text(&with_gap));
-        let with_epoch_time =
-            file_text(&mut [0.0].into_iter().chain(steady_times().map(|time_s| 1.7e9 + time_s)));
+        let csv_with_gap =
+            csv_of_times(&mut steady_times().chain(steady_times().map(|time_s| 1e4 + time_s)));
+        assert!(refusal_text(&csv_with_gap).contains(":202:1"), "{}", refusal_text(&csv_with_gap));
+        let csv_with_epoch_time =
+            csv_of_times(&mut [0.0].into_iter().chain(steady_times().map(|time_s| 1.7e9 + time_s)));
         assert!(
-            refusal_text(&with_epoch_time).contains(":3:1"),
+            refusal_text(&csv_with_epoch_time).contains(":3:1"),
             "{}",
-            refusal_text(&with_epoch_time)
+            refusal_text(&csv_with_epoch_time)
         );
-        let in_milliseconds = file_text(&mut (0..40_000).map(|k| 0.1 * f64::from(k)));
-        let text = refusal_text(&in_milliseconds);
+        let csv_in_milliseconds = csv_of_times(&mut (0..40_000).map(|k| 0.1 * f64::from(k)));
+        let text = refusal_text(&csv_in_milliseconds);
         assert!(text.contains("s long: are these ms?") && text.lines().count() < 12, "{text}");
     }
 
     #[test]
     fn a_clock_that_does_not_start_with_the_run_counts_from_the_first_row() {
-        let record = |first_s: f64, first_rpm: f64, with_tachometer: bool| {
-            let column = |name: &str, value: &dyn Fn(f64) -> f64| {
+        let measurement_from = |first_s: f64, first_rpm: f64, with_tachometer: bool| {
+            let column_over_time = |name: &str, value: &dyn Fn(f64) -> f64| {
                 (name.to_owned(), (0..100).map(|k| value(0.1 * f64::from(k))).collect::<Vec<f64>>())
             };
-            let mut columns =
-                vec![column("time_s", &|t| first_s + t), column("tub_yaw", &|t| t.sin())];
+            let mut columns = vec![
+                column_over_time("time_s", &|t| first_s + t),
+                column_over_time("tub_yaw", &|t| t.sin()),
+            ];
             if with_tachometer {
-                columns.push(column("speed_rpm", &|t| first_rpm + 20.0 * t));
+                columns.push(column_over_time("speed_rpm", &|t| first_rpm + 20.0 * t));
             }
             let mut measurement = Measurement::from_columns(columns, &[]).unwrap();
             measurement.count_from_first_row(24.0);
             measurement
         };
-        for (first_s, first_rpm, with_tachometer, is_clock) in [
+        for (first_s, first_rpm, with_tachometer, counts_from_first_row) in [
             (1.7e9, 0.0, true, true),
             (1.7e9, 150.0, true, true),
             (36_000.0, 0.0, false, true),
             (60.0, 0.0, true, true),
             (60.0, 0.0, false, true),
-            // A tachometer that turns already: the run began before, at time 0.
+            // The tachometer shows that the drum turns already, so that the run began at time 0.
             (60.0, 150.0, true, false),
-            // Within the grid's run.
+            // The record begins within the grid's run.
             (15.0, 0.0, false, false),
             (0.5, 0.0, true, false),
         ] {
-            let measurement = record(first_s, first_rpm, with_tachometer);
+            let measurement = measurement_from(first_s, first_rpm, with_tachometer);
             let description = format!("{first_s} {first_rpm} {with_tachometer}");
-            assert_eq!(measurement.clock_start_s, is_clock.then_some(first_s), "{description}");
-            assert!((measurement.time_s[0] == 0.0) == is_clock, "{description}");
+            assert_eq!(
+                measurement.clock_start_s,
+                counts_from_first_row.then_some(first_s),
+                "{description}"
+            );
+            assert!((measurement.time_s[0] == 0.0) == counts_from_first_row, "{description}");
             assert!(
                 (measurement.time_s[99] - measurement.time_s[0] - 9.9).abs() < 1e-6,
                 "{description}"
@@ -723,26 +741,32 @@ mod tests {
         assert_eq!(measurement.time_s[19], 0.38);
         assert_eq!(measurement.speed_rpm.expect("it is there")[2], 12_000.0);
         let columns: Vec<String> =
-            measurement.signals.iter().map(|it| it.quantity.column()).collect();
+            measurement.signals.iter().map(|signal| signal.quantity.column()).collect();
         assert_eq!(columns, ["tub_front_y_m_per_s2"]);
         assert_eq!(measurement.signals[0].values[4], 4.0 * 9.80665);
         assert!(measurement.notes.join(";").contains("left out the column `Temp`"));
         // Times of a clock are seconds since midnight.
         let rows: String = (0..20).map(|k| format!("12:00:0{}.{},{k}\n", k / 10, k % 10)).collect();
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
-        let clock = Measurement::read(&path, &[]).unwrap();
-        assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
-        let start = |mut measurement: Measurement| {
+        let clock_measurement = Measurement::read(&path, &[]).unwrap();
+        assert_eq!(
+            (clock_measurement.time_s[0], clock_measurement.time_s[19]),
+            (43_200.0, 43_201.9)
+        );
+        let clock_start_of = |mut measurement: Measurement| {
             measurement.count_from_first_row(24.0);
             measurement.clock_start()
         };
-        assert_eq!(start(clock).as_deref(), Some("12:00:00.0"));
+        assert_eq!(clock_start_of(clock_measurement).as_deref(), Some("12:00:00.0"));
         let rows: String =
             (0..20).map(|k| format!("{}.{},{k}\n", 43_200 + k / 10, k % 10)).collect();
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
-        assert_eq!(start(Measurement::read(&path, &[]).unwrap()).as_deref(), Some("43200 s"));
+        assert_eq!(
+            clock_start_of(Measurement::read(&path, &[]).unwrap()).as_deref(),
+            Some("43200 s")
+        );
         std::fs::write(&path, &text).unwrap();
-        // Without the user's names nothing is measured, and what to do is said.
+        // Without names for the columns the file has no signals, and the message says what to do.
         let refusal_text = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(
             refusal_text.contains("--column 'Acc front=tub_front_y_m_per_s2'"),
@@ -752,7 +776,7 @@ mod tests {
 
     #[test]
     fn a_tachometer_by_pulses_is_read() {
-        for (name, signal) in [
+        for (name, expected_signal) in [
             ("tacho_pulses", Some((PulseSignal::Voltage, 1))),
             ("tacho_60_pulses", Some((PulseSignal::Voltage, 60))),
             ("tacho_count", Some((PulseSignal::Count, 1))),
@@ -763,14 +787,14 @@ mod tests {
             ("tacho__pulses", None),
             ("tacho_60", None),
         ] {
-            assert_eq!(PulseSignal::from_name(name), signal, "{name}");
+            assert_eq!(PulseSignal::from_name(name), expected_signal, "{name}");
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         let read_record = |columns: &str, period: u32, further_cells: &str| {
-            let volts = |k: u32| if k % period < period / 2 { 0.1 } else { 4.9 };
+            let voltage_v = |k: u32| if k % period < period / 2 { 0.1 } else { 4.9 };
             let rows: String = (0..80)
-                .map(|k| format!("{},{k},{}{further_cells}\n", 0.01 * f64::from(k), volts(k)))
+                .map(|k| format!("{},{k},{}{further_cells}\n", 0.01 * f64::from(k), voltage_v(k)))
                 .collect();
             std::fs::write(&path, format!("{columns}\n{rows}")).unwrap();
             let names_by_header = [("Tacho".to_owned(), "tacho_12_pulses".to_owned())];
@@ -811,9 +835,10 @@ mod tests {
     fn a_tachometer_by_a_count_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
-        let read_record = |header: &str, count: &dyn Fn(u32) -> u32| {
-            let rows: String =
-                (0..400).map(|k| format!("{},{k},{}\n", 0.01 * f64::from(k), count(k))).collect();
+        let read_record = |header: &str, count_in_row: &dyn Fn(u32) -> u32| {
+            let rows: String = (0..400)
+                .map(|k| format!("{},{k},{}\n", 0.01 * f64::from(k), count_in_row(k)))
+                .collect();
             std::fs::write(&path, format!("Time,tub_yaw,{header}\n{rows}")).unwrap();
             let names_by_header = [("Pulses".to_owned(), "tacho_60_count".to_owned())];
             Measurement::read(&path, &names_by_header)
@@ -844,10 +869,10 @@ mod tests {
             0..10 => format!("23:59:59.{k}"),
             _ => format!("00:00:0{}.{}", k / 10 - 1, k % 10),
         };
-        let seconds = |k: u32| format!("{}", (863_990 + k) % 864_000 / 10);
-        let day_seconds = |k: u32| format!("{}.{}", seconds(k), k % 10);
-        for time in [&clock_time as &dyn Fn(u32) -> String, &day_seconds] {
-            let rows: String = (0..40).map(|k| format!("{},{k}\n", time(k))).collect();
+        let whole_seconds = |k: u32| format!("{}", (863_990 + k) % 864_000 / 10);
+        let decimal_seconds = |k: u32| format!("{}.{}", whole_seconds(k), k % 10);
+        for time_text in [&clock_time as &dyn Fn(u32) -> String, &decimal_seconds] {
+            let rows: String = (0..40).map(|k| format!("{},{k}\n", time_text(k))).collect();
             std::fs::write(&path, format!("Time,tub_yaw\n{rows}")).unwrap();
             let mut measurement = Measurement::read(&path, &[]).unwrap();
             assert!(
@@ -860,7 +885,7 @@ mod tests {
                 assert!((time_s - 0.1 * k as f64).abs() < 1e-9, "{k}: {time_s}");
             }
         }
-        // A fall by less, and one by more than a day, are mistakes.
+        // A clock that falls by much less than a day, or by more than a day, is a mistake.
         for first_s in [80_000, 100_000] {
             let text = refusal_text(&format!("time_s,tub_yaw\n{first_s},1\n0,2\n"));
             assert!(text.contains(&format!("time goes back: 0 s after {first_s} s")), "{text}");
@@ -869,8 +894,8 @@ mod tests {
 
     #[test]
     fn drop_outs_of_the_tachometer_are_left_out_and_a_standstill_is_not() {
-        // A wash in both directions with a wait, then a spin.
-        let true_speed = |t: f64| match t {
+        // The drum washes in both directions with a pause, then spins.
+        let true_speed_rpm = |t: f64| match t {
             t if t < 1.0 => 50.0 * t,
             t if t < 2.0 => 50.0 * (2.0 - t),
             t if t < 4.0 => 0.0,
@@ -878,16 +903,18 @@ mod tests {
             t if t < 6.0 => -50.0 * (6.0 - t),
             t => 30.0 * (t - 6.0),
         };
-        let record_with_zeros = |step_s: f64, digit_rpm: f64, zeros: &[usize]| {
+        let record_with_zeros = |step_s: f64, resolution_rpm: f64, zero_rows: &[usize]| {
             let times: Vec<f64> =
                 (0..(12.0 / step_s) as u32).map(|k| step_s * f64::from(k)).collect();
-            let mut speeds: Vec<f64> =
-                times.iter().map(|t| (true_speed(*t) / digit_rpm).round() * digit_rpm).collect();
-            zeros.iter().for_each(|row| speeds[*row] = 0.0);
-            let yaw = times.iter().map(|t| t.sin()).collect();
-            let columns = [("time_s", times), ("speed_rpm", speeds), ("tub_yaw", yaw)];
-            let columns = columns.map(|(name, values)| (name.to_owned(), values));
-            Measurement::from_columns(columns.to_vec(), &[]).unwrap()
+            let mut speeds: Vec<f64> = times
+                .iter()
+                .map(|t| (true_speed_rpm(*t) / resolution_rpm).round() * resolution_rpm)
+                .collect();
+            zero_rows.iter().for_each(|row| speeds[*row] = 0.0);
+            let yaw_values = times.iter().map(|t| t.sin()).collect();
+            let columns = [("time_s", times), ("speed_rpm", speeds), ("tub_yaw", yaw_values)];
+            let owned_columns = columns.map(|(name, values)| (name.to_owned(), values));
+            Measurement::from_columns(owned_columns.to_vec(), &[]).unwrap()
         };
         for (step_s, digit_rpm) in [(0.001, 1e-3), (0.001, 5.0), (0.02, 1.0), (0.1, 1e-3)] {
             let without_zeros = record_with_zeros(step_s, digit_rpm, &[]);
@@ -911,24 +938,24 @@ mod tests {
 
     #[test]
     fn rows_before_the_run_are_left_out() {
-        let columns = |from: i32| {
-            let numbers = |by: f64| (from..20).map(|k| by * f64::from(k)).collect();
-            let named = |(name, by): (&str, f64)| (name.to_owned(), numbers(by));
-            [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named).to_vec()
+        let columns_from_row = |first_row: i32| {
+            let multiples = |factor: f64| (first_row..20).map(|k| factor * f64::from(k)).collect();
+            let named_column = |(name, by): (&str, f64)| (name.to_owned(), multiples(by));
+            [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named_column).to_vec()
         };
         let [full_record, early_record] =
-            [0, -30].map(|from| Measurement::from_columns(columns(from), &[]).unwrap());
+            [0, -30].map(|from| Measurement::from_columns(columns_from_row(from), &[]).unwrap());
         assert_eq!(early_record, Measurement { rows_before_start: 30, ..full_record });
     }
 
     #[test]
     fn a_missing_sample_is_not_a_number_and_a_gap_is_seen() {
-        let row = |k: usize| {
+        let time_and_yaw = |k: usize| {
             let t = if k < 10 { 0.01 * k as f64 } else { 5.0 + 0.01 * k as f64 };
             (t, if k.is_multiple_of(3) { f64::NAN } else { k as f64 })
         };
-        let (time_s, yaw) = (0..40).map(row).unzip();
-        let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
+        let (time_s, yaw_values) = (0..40).map(time_and_yaw).unzip();
+        let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw_values)];
         let measurement = Measurement::from_columns(columns, &[]).unwrap();
         assert_eq!(measurement.count_samples(), 26);
         assert_eq!(measurement.gaps_s.len(), 1);

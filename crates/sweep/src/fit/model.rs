@@ -23,13 +23,13 @@ use sweep_engine::plan::NumberSources;
 
 /// The step of a difference quotient, as a part of the number. Basis: the square root of the
 /// rounding error of a trajectory. Doubling it doubles the error of derivatives by curvature.
-const DIFFERENCE_RATIO: f64 = 1e-5;
+const RELATIVE_DIFFERENCE_STEP: f64 = 1e-5;
 /// The greatest shift of a measurement's clock (s). Basis: a logger that starts by hand is set to
 /// the run's start more exactly. Doubling it lengthens every trajectory by a quarter of a second.
 pub(super) const MAX_SHIFT_S: f64 = 0.25;
 /// The step of a difference quotient by the clock's shift (s). Basis: a thousandth of a turn at
 /// 6000 rpm. Doubling it doubles the error of that derivative by curvature.
-const DIFFERENCE_S: f64 = 1e-5;
+const SHIFT_DIFFERENCE_STEP_S: f64 = 1e-5;
 
 /// A measurement and the run that was measured.
 #[derive(Clone, Debug)]
@@ -60,7 +60,7 @@ impl FitCase {
     }
 
     /// Returns the number of samples of a signal in a second, on average.
-    pub(crate) fn rate_hz(&self, signal: &Signal) -> f64 {
+    pub(crate) fn sampling_rate_hz(&self, signal: &Signal) -> f64 {
         let times = &self.measurement.time_s;
         signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
@@ -93,8 +93,8 @@ impl FreeParameter {
 /// subtracted.
 pub(crate) struct Problem<'a> {
     pub(crate) cases: Vec<FitCase>,
-    pub(crate) free: Vec<FreeParameter>,
-    pub(crate) model: ModelKind,
+    pub(crate) free_parameters: Vec<FreeParameter>,
+    pub(crate) model_kind: ModelKind,
     pub(crate) fits_shift: bool,
     pub(crate) method: Method,
     pub(crate) simd: Simd,
@@ -108,10 +108,10 @@ type CaseRun = (Machine, Spin, f64);
 /// The comparison of a measured signal with the model.
 #[derive(Clone, Debug)]
 pub(crate) struct SignalComparison {
-    pub(crate) case: usize,
-    pub(crate) signal: usize,
+    pub(crate) case_index: usize,
+    pub(crate) signal_index: usize,
     /// The values of the model at every row, without the offset.
-    pub(crate) model: Vec<f64>,
+    pub(crate) model_values: Vec<f64>,
     pub(crate) offset: f64,
     /// The difference of measurement and model less the offset, at each sample.
     pub(crate) residual: Vec<f64>,
@@ -128,7 +128,7 @@ pub(crate) struct NormalEquations {
     /// The standard deviation of each signal's noise.
     pub(crate) sigma: Vec<f64>,
     /// The normal matrix J' W J, with the Jacobian J and the weights W.
-    pub(crate) normal: Vec<Vec<f64>>,
+    pub(crate) normal_matrix: Vec<Vec<f64>>,
     /// The right side J' W r, with the residual r.
     pub(crate) rhs: Vec<f64>,
 }
@@ -153,19 +153,23 @@ impl Problem<'_> {
     }
 
     /// Returns the number of unknowns.
-    pub(crate) fn unknowns(&self) -> usize {
-        self.free.len() + if self.fits_shift { self.cases.len() } else { 0 }
+    pub(crate) fn unknown_count(&self) -> usize {
+        self.free_parameters.len() + if self.fits_shift { self.cases.len() } else { 0 }
     }
 
     /// Returns the range of an unknown.
     pub(crate) fn unknown_range(&self, unknown: usize) -> [f64; 2] {
-        self.free.get(unknown).map_or([-MAX_SHIFT_S, MAX_SHIFT_S], |free| free.range)
+        self.free_parameters.get(unknown).map_or([-MAX_SHIFT_S, MAX_SHIFT_S], |free| free.range)
     }
 
     /// Returns the unknowns at the start.
     pub(crate) fn start_point(&self) -> Vec<f64> {
-        let shifts = self.unknowns() - self.free.len();
-        self.free.iter().map(|free| free.start).chain(std::iter::repeat_n(0.0, shifts)).collect()
+        let shift_count = self.unknown_count() - self.free_parameters.len();
+        self.free_parameters
+            .iter()
+            .map(|free| free.start)
+            .chain(std::iter::repeat_n(0.0, shift_count))
+            .collect()
     }
 
     /// Iterates over the signals of all cases, in order.
@@ -177,14 +181,16 @@ impl Problem<'_> {
 
     /// Returns the shift of a case's clock (s).
     pub(crate) fn shift_s(&self, case: usize, x: &[f64]) -> f64 {
-        if self.fits_shift { x[self.free.len() + case] } else { 0.0 }
+        if self.fits_shift { x[self.free_parameters.len() + case] } else { 0.0 }
     }
 
     /// Returns the machine and the spin of a case.
     pub(crate) fn machine(&self, case: usize, x: &[f64]) -> (Machine, Spin) {
         let mut machine = self.cases[case].plan.model.machine.clone();
         let mut spin = self.cases[case].spin().clone();
-        for (free, value) in self.free.iter().zip(x).filter(|(free, _)| free.belongs_to(case)) {
+        for (free, value) in
+            self.free_parameters.iter().zip(x).filter(|(free, _)| free.belongs_to(case))
+        {
             free.parameter.set(&mut machine, &mut spin, *value);
         }
         (machine, spin)
@@ -194,10 +200,12 @@ impl Problem<'_> {
     pub(crate) fn number_sources(&self) -> NumberSources {
         let plan = &self.cases[0].plan;
         let mut number_sources = plan.sources.clone();
-        for free in self.free.iter().filter(|free| free.belongs_to(0)) {
-            let files = self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
-            let files: Vec<&str> = files.map(|(_, case)| &*case.measurement.name).collect();
-            let source = format!("fit to {}", files.join(", "));
+        for free in self.free_parameters.iter().filter(|free| free.belongs_to(0)) {
+            let cases_with_value =
+                self.cases.iter().enumerate().filter(|(case, _)| free.belongs_to(*case));
+            let file_names: Vec<&str> =
+                cases_with_value.map(|(_, case)| &*case.measurement.name).collect();
+            let source = format!("fit to {}", file_names.join(", "));
             let single_names = free.parameter.single_names(&plan.model.machine).into_iter();
             number_sources.0.extend(single_names.map(|part| (part.into_owned(), source.clone())));
         }
@@ -205,25 +213,26 @@ impl Problem<'_> {
     }
 
     /// Whether an unknown matters to a case.
-    fn affects_case(&self, unknown: usize, case: usize) -> bool {
-        match self.free.get(unknown) {
+    fn unknown_affects_case(&self, unknown: usize, case: usize) -> bool {
+        match self.free_parameters.get(unknown) {
             Some(free) => free.belongs_to(case),
-            None => unknown - self.free.len() == case,
+            None => unknown - self.free_parameters.len() == case,
         }
     }
 
     /// Returns the step of the difference quotient by an unknown, which stays within its range.
     fn difference_step(&self, unknown: usize, x: &[f64]) -> f64 {
-        let step = self.free.get(unknown).map_or(DIFFERENCE_S, |free| {
+        let step = self.free_parameters.get(unknown).map_or(SHIFT_DIFFERENCE_STEP_S, |free| {
             let width = free.range[1] - free.range[0];
-            let size = x[unknown].abs().max(free.start.abs());
-            DIFFERENCE_RATIO * if width.is_finite() { size.max(0.01 * width) } else { size }
+            let magnitude = x[unknown].abs().max(free.start.abs());
+            RELATIVE_DIFFERENCE_STEP
+                * if width.is_finite() { magnitude.max(0.01 * width) } else { magnitude }
         });
         if x[unknown] + step > self.unknown_range(unknown)[1] { -step } else { step }
     }
 
     /// Returns the run of a case at some unknowns.
-    fn machine_and_shift(&self, case: usize, x: &[f64]) -> CaseRun {
+    fn case_run(&self, case: usize, x: &[f64]) -> CaseRun {
         let (machine, spin) = self.machine(case, x);
         (machine, spin, self.shift_s(case, x))
     }
@@ -236,15 +245,16 @@ impl Problem<'_> {
         case: usize,
         count: usize,
         machine_and_shift: impl Fn(usize) -> CaseRun + Sync,
-        reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
+        reduce_signals: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
         let measurement = &self.cases[case].measurement;
         let end_s = self.cases[case].end_s();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
         let recorders = Recorders { snapshots: true, ..Recorders::default() };
-        let group_values = |group: &[usize]| {
-            let runs = group.iter().map(|&k| machine_and_shift(k)).enumerate();
-            let valid_runs = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
+        let simulate_group = |group: &[usize]| {
+            let numbered_runs = group.iter().map(|&k| machine_and_shift(k)).enumerate();
+            let valid_runs =
+                numbered_runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
             let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = valid_runs
                 .map(|(run_index, (machine, spin, shift_s))| {
                     ((run_index, shift_s), (machine, spin))
@@ -260,8 +270,8 @@ impl Problem<'_> {
                 })
                 .collect();
             let point_references: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
-            let model = self.model;
-            let simulated = simulate_until(
+            let model = self.model_kind;
+            let simulation = simulate_until(
                 self.simd,
                 model,
                 &self.method,
@@ -269,75 +279,85 @@ impl Problem<'_> {
                 recorders,
                 self.cancel,
             );
-            let extras = simulated.map_or_else(Vec::new, |(_, extras)| extras);
+            let recorder_outputs = simulation.map_or_else(Vec::new, |(_, extras)| extras);
             let mut results: Vec<Option<T>> = group.iter().map(|_| None).collect();
-            for ((run_index, point), extra) in points.iter().zip(extras) {
+            for ((run_index, point), extra) in points.iter().zip(recorder_outputs) {
                 let snapshots = extra.snapshots;
                 if snapshots.len() < measurement.time_s.len() {
                     continue;
                 }
-                let values = |signal: &Signal| -> Vec<f64> {
-                    snapshots.iter().map(|snapshot| self.value(snapshot, signal, point)).collect()
+                let signal_values = |signal: &Signal| -> Vec<f64> {
+                    snapshots
+                        .iter()
+                        .map(|snapshot| self.signal_value(snapshot, signal, point))
+                        .collect()
                 };
                 results[*run_index] =
-                    Some(reduce(measurement.signals.iter().map(values).collect()));
+                    Some(reduce_signals(measurement.signals.iter().map(signal_values).collect()));
             }
             results
         };
         let indices: Vec<usize> = (0..count).collect();
-        indices.par_chunks(self.simd.lanes().max(2)).flat_map_iter(group_values).collect()
+        indices.par_chunks(self.simd.lanes().max(2)).flat_map_iter(simulate_group).collect()
     }
 
-    fn value(&self, snapshot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
+    fn signal_value(&self, snapshot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
         match signal.quantity {
             SignalQuantity::Motion(channel, order) => snapshot.channels[channel.index()][order],
-            SignalQuantity::CabinetForce(axis) => snapshot.cabinet_force_n(point, self.model)[axis],
+            SignalQuantity::CabinetForce(axis) => {
+                snapshot.cabinet_force_n(point, self.model_kind)[axis]
+            }
         }
     }
 
     /// Compares every signal with the model. It uses all threads of the current rayon pool.
     pub(crate) fn compare(&self, x: &[f64]) -> Option<Vec<SignalComparison>> {
-        let unknowns = self.unknowns();
-        let steps: Vec<f64> = (0..unknowns).map(|k| self.difference_step(k, x)).collect();
+        let unknown_count = self.unknown_count();
+        let steps: Vec<f64> = (0..unknown_count).map(|k| self.difference_step(k, x)).collect();
         // A run with each unknown that matters to the case shifted, then the run at the point.
-        let simulate_case = |case: usize| {
+        let simulate_varied_runs = |case: usize| {
             let varied_unknowns: Vec<usize> =
-                (0..unknowns).filter(|&k| self.affects_case(k, case)).collect();
-            let machine_and_shift = |index: usize| {
+                (0..unknown_count).filter(|&k| self.unknown_affects_case(k, case)).collect();
+            let varied_run = |index: usize| {
                 let mut x = x.to_vec();
                 if let Some(&k) = varied_unknowns.get(index) {
                     x[k] += steps[k];
                 }
-                self.machine_and_shift(case, &x)
+                self.case_run(case, &x)
             };
-            let mut simulated = self.simulate_signals(
-                case,
-                varied_unknowns.len() + 1,
-                machine_and_shift,
-                |values| values,
-            );
-            let signals = simulated.pop()??;
-            let mut shifted = vec![None; unknowns];
-            for (&k, values) in varied_unknowns.iter().zip(simulated) {
-                shifted[k] = Some(values?);
+            let mut varied_signals =
+                self.simulate_signals(case, varied_unknowns.len() + 1, varied_run, |values| values);
+            let unvaried_signals = varied_signals.pop()??;
+            let mut signals_by_unknown = vec![None; unknown_count];
+            for (&k, values) in varied_unknowns.iter().zip(varied_signals) {
+                signals_by_unknown[k] = Some(values?);
             }
-            Some((signals, shifted))
+            Some((unvaried_signals, signals_by_unknown))
         };
-        let simulated = (0..self.cases.len()).into_par_iter().map(simulate_case);
-        let simulated: Vec<_> = simulated.collect::<Option<_>>()?;
+        let simulations = (0..self.cases.len()).into_par_iter().map(simulate_varied_runs);
+        let simulations_by_case: Vec<_> = simulations.collect::<Option<_>>()?;
         let compare_signal = |(case, s, signal): (usize, usize, &Signal)| {
-            let (signals, shifted) = &simulated[case];
+            let (signals, shifted) = &simulations_by_case[case];
             let model = signals[s].clone();
-            let slope = |shifted: &Option<Vec<Vec<f64>>>, step: f64| -> Vec<f64> {
-                let Some(shifted) = shifted else { return Vec::new() };
-                let slope_at = |(row, _)| (shifted[s][row] - model[row]) / step;
-                subtract_mean(signal.samples().map(slope_at).collect()).0
-            };
-            let slopes = shifted.iter().zip(&steps).map(|(shifted, step)| slope(shifted, *step));
+            let slope_by_unknown =
+                |varied_signals: &Option<Vec<Vec<f64>>>, step: f64| -> Vec<f64> {
+                    let Some(shifted) = varied_signals else { return Vec::new() };
+                    let slope_at = |(row, _)| (shifted[s][row] - model[row]) / step;
+                    subtract_mean(signal.samples().map(slope_at).collect()).0
+                };
+            let slopes =
+                shifted.iter().zip(&steps).map(|(shifted, step)| slope_by_unknown(shifted, *step));
             let slopes = slopes.collect();
             let difference = signal.samples().map(|(row, measurement)| measurement - model[row]);
             let (residual, offset) = subtract_mean(difference.collect());
-            SignalComparison { case, signal: s, model, offset, residual, slopes }
+            SignalComparison {
+                case_index: case,
+                signal_index: s,
+                model_values: model,
+                offset,
+                residual,
+                slopes,
+            }
         };
         Some(self.signals().map(compare_signal).collect())
     }
@@ -350,24 +370,28 @@ impl Problem<'_> {
         case: usize,
         x: &[f64],
         comparisons: &[SignalComparison],
-        (count, change): (usize, impl Fn(usize, &mut Machine, &mut Spin) + Sync),
+        (count, apply_change): (usize, impl Fn(usize, &mut Machine, &mut Spin) + Sync),
         reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
-        let machine_and_shift = |k: usize| {
-            let (mut machine, mut spin, shift_s) = self.machine_and_shift(case, x);
-            change(k, &mut machine, &mut spin);
+        let changed_run = |k: usize| {
+            let (mut machine, mut spin, shift_s) = self.case_run(case, x);
+            apply_change(k, &mut machine, &mut spin);
             (machine, spin, shift_s)
         };
         let case_comparisons: Vec<&SignalComparison> =
-            comparisons.iter().filter(|comparison| comparison.case == case).collect();
-        let reduce_changes = |values: Vec<Vec<f64>>| {
-            let change = |(values, comparison): (&Vec<f64>, &&SignalComparison)| -> Vec<f64> {
-                let signal = &self.cases[case].measurement.signals[comparison.signal];
-                signal.samples().map(|(row, _)| values[row] - comparison.model[row]).collect()
-            };
-            reduce(values.iter().zip(&case_comparisons).map(change).collect())
+            comparisons.iter().filter(|comparison| comparison.case_index == case).collect();
+        let reduce_to_changes = |values: Vec<Vec<f64>>| {
+            let signal_change =
+                |(values, comparison): (&Vec<f64>, &&SignalComparison)| -> Vec<f64> {
+                    let signal = &self.cases[case].measurement.signals[comparison.signal_index];
+                    signal
+                        .samples()
+                        .map(|(row, _)| values[row] - comparison.model_values[row])
+                        .collect()
+                };
+            reduce(values.iter().zip(&case_comparisons).map(signal_change).collect())
         };
-        self.simulate_signals(case, count, machine_and_shift, reduce_changes)
+        self.simulate_signals(case, count, changed_run, reduce_to_changes)
     }
 
     /// Computes for each of `count` changes of a case's machine and spin the change of the normal
@@ -379,16 +403,16 @@ impl Problem<'_> {
         x: &[f64],
         (comparisons, sigma): (&[SignalComparison], &[f64]),
         count: usize,
-        change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
+        apply_change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
     ) -> Vec<Option<Vec<f64>>> {
         let case_comparisons: Vec<(&SignalComparison, f64)> = comparisons
             .iter()
             .zip(sigma)
-            .filter(|(comparison, _)| comparison.case == case)
+            .filter(|(comparison, _)| comparison.case_index == case)
             .map(|(comparison, sigma)| (comparison, *sigma))
             .collect();
-        let rhs_change = |changes: Vec<Vec<f64>>| {
-            let mut rhs_change = vec![0.0; self.unknowns()];
+        let change_right_side = |changes: Vec<Vec<f64>>| {
+            let mut rhs_change = vec![0.0; self.unknown_count()];
             for (change, (comparison, sigma)) in changes.iter().zip(&case_comparisons) {
                 for (rhs_change, slope) in rhs_change.iter_mut().zip(&comparison.slopes) {
                     *rhs_change += dot(slope, change) / (sigma * sigma);
@@ -396,31 +420,31 @@ impl Problem<'_> {
             }
             rhs_change
         };
-        self.compute_changes(case, x, comparisons, (count, change), rhs_change)
+        self.compute_changes(case, x, comparisons, (count, apply_change), change_right_side)
     }
 
     /// Computes the costs of many sets of unknowns, without derivatives. The cost of a run that
     /// fails is infinite.
-    pub(crate) fn compute_costs(&self, unknowns: &[Vec<f64>]) -> Vec<f64> {
+    pub(crate) fn compute_costs(&self, unknown_sets: &[Vec<f64>]) -> Vec<f64> {
         let case_costs = |case: usize| {
-            let cost = |models: Vec<Vec<f64>>| -> f64 {
+            let cost_of_models = |models: Vec<Vec<f64>>| -> f64 {
                 let signals = self.cases[case].measurement.signals.iter().zip(models);
-                let signal_cost = |(signal, model): (&Signal, Vec<f64>)| {
+                let cost_of_signal = |(signal, model): (&Signal, Vec<f64>)| {
                     let difference = signal.samples().map(|(row, value)| value - model[row]);
                     let (residual, _) = subtract_mean(difference.collect());
-                    signal_cost_and_noise(&residual, signal).0
+                    compute_cost_and_noise(&residual, signal).0
                 };
-                signals.map(signal_cost).sum()
+                signals.map(cost_of_signal).sum()
             };
             self.simulate_signals(
                 case,
-                unknowns.len(),
-                |k| self.machine_and_shift(case, &unknowns[k]),
-                cost,
+                unknown_sets.len(),
+                |k| self.case_run(case, &unknown_sets[k]),
+                cost_of_models,
             )
         };
         let costs_by_case: Vec<_> = (0..self.cases.len()).into_par_iter().map(case_costs).collect();
-        let mut costs = vec![0.0; unknowns.len()];
+        let mut costs = vec![0.0; unknown_sets.len()];
         for case_costs in costs_by_case {
             for (sum, cost) in costs.iter_mut().zip(case_costs) {
                 *sum += cost.unwrap_or(f64::INFINITY);
@@ -431,25 +455,25 @@ impl Problem<'_> {
 
     /// Computes the cost and the normal equations of a comparison.
     pub(crate) fn normal_equations(&self, comparisons: &[SignalComparison]) -> NormalEquations {
-        let n = self.unknowns();
+        let unknown_count = self.unknown_count();
         let mut equations = NormalEquations {
             cost: 0.0,
             sigma: Vec::new(),
-            normal: vec![vec![0.0; n]; n],
-            rhs: vec![0.0; n],
+            normal_matrix: vec![vec![0.0; unknown_count]; unknown_count],
+            rhs: vec![0.0; unknown_count],
         };
         for ((.., signal), comparisons) in self.signals().zip(comparisons) {
-            let (cost, sigma) = signal_cost_and_noise(&comparisons.residual, signal);
+            let (cost, sigma) = compute_cost_and_noise(&comparisons.residual, signal);
             equations.cost += cost;
             equations.sigma.push(sigma);
             let weight = 1.0 / (sigma * sigma);
-            for i in 0..n {
+            for i in 0..unknown_count {
                 equations.rhs[i] += weight * dot(&comparisons.slopes[i], &comparisons.residual);
                 for j in 0..=i {
                     let product = weight * dot(&comparisons.slopes[i], &comparisons.slopes[j]);
-                    equations.normal[i][j] += product;
+                    equations.normal_matrix[i][j] += product;
                     if i != j {
-                        equations.normal[j][i] += product;
+                        equations.normal_matrix[j][i] += product;
                     }
                 }
             }
@@ -460,10 +484,10 @@ impl Problem<'_> {
 
 /// Returns the part of the cost of a signal, and the standard deviation of its noise, which is that
 /// of the residual, and at least a millionth of the signal's.
-fn signal_cost_and_noise(residual: &[f64], signal: &Signal) -> (f64, f64) {
+fn compute_cost_and_noise(residual: &[f64], signal: &Signal) -> (f64, f64) {
     let centred_values = signal.centred_values();
-    let count = residual.len() as f64;
-    let least_square = 1e-12 * dot(&centred_values, &centred_values) + f64::MIN_POSITIVE;
-    let mean_square = (dot(residual, residual) + least_square) / count;
-    (count * libm::log(mean_square), mean_square.sqrt())
+    let sample_count = residual.len() as f64;
+    let min_square_sum = 1e-12 * dot(&centred_values, &centred_values) + f64::MIN_POSITIVE;
+    let mean_square = (dot(residual, residual) + min_square_sum) / sample_count;
+    (sample_count * libm::log(mean_square), mean_square.sqrt())
 }

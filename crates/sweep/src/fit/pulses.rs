@@ -115,8 +115,9 @@ impl Pulses {
     ) -> Result<Self, PulseError> {
         let samples: Vec<(usize, f64)> =
             voltage.iter().copied().enumerate().filter(|(_, value)| !value.is_nan()).collect();
-        let lowest = samples.iter().fold(f64::INFINITY, |low, (_, value)| low.min(*value));
-        let highest = samples.iter().fold(f64::NEG_INFINITY, |high, (_, value)| high.max(*value));
+        let lowest = samples.iter().fold(f64::INFINITY, |minimum, (_, value)| minimum.min(*value));
+        let highest =
+            samples.iter().fold(f64::NEG_INFINITY, |maximum, (_, value)| maximum.max(*value));
         let [quarter_level, half_level] =
             [0.25, 0.5].map(|fraction| lowest + fraction * (highest - lowest));
         let mut pulse_times_s = Vec::new();
@@ -129,7 +130,7 @@ impl Pulses {
             if !is_low || value >= half_level || next_value < half_level {
                 continue;
             }
-            if last_sample.is_some_and(|last| sample - last < MIN_ROWS_PER_PULSE) {
+            if last_sample.is_some_and(|last_sample| sample - last_sample < MIN_ROWS_PER_PULSE) {
                 return Err(PulseError::TooFast(next_row));
             }
             let fraction = (half_level - value) / (next_value - value);
@@ -155,8 +156,8 @@ impl Pulses {
             samples.iter().fold(0.0_f64, |greatest, (_, value)| greatest.max(*value));
         let greatest_increment =
             samples.windows(2).fold(1.0_f64, |greatest, pair| greatest.max(pair[1].1 - pair[0].1));
-        let range = COUNTER_RANGES.into_iter().find(|range| *range > greatest_count);
-        let mut pulses = 0.0;
+        let counter_range = COUNTER_RANGES.into_iter().find(|range| *range > greatest_count);
+        let mut pulse_count = 0.0;
         let mut pulse_times_s: Vec<f64> = Vec::new();
         let mut turns = Vec::new();
         for pair in samples.windows(2) {
@@ -164,7 +165,7 @@ impl Pulses {
             let (next_row, next_value) = pair[1];
             let mut increment = next_value - value;
             if increment < 0.0 {
-                increment += range.unwrap_or(0.0);
+                increment += counter_range.unwrap_or(0.0);
                 let limit = MAX_OVERFLOW_INCREMENT * greatest_increment;
                 if !(0.0..=limit).contains(&increment) {
                     return Err(PulseError::FallingCount(next_row));
@@ -173,16 +174,16 @@ impl Pulses {
             if increment == 0.0 {
                 continue;
             }
-            pulses += increment;
+            pulse_count += increment;
             let spacing_s = (time_s[next_row] - time_s[row]) / increment.max(1.0);
             let pulse_time_s = time_s[next_row] - 0.5 * spacing_s;
             // The difference of two times, each distributed evenly over the spacing.
             let error_s = spacing_s / 6.0_f64.sqrt();
-            let is_known =
+            let speed_is_known =
                 |last_s: &f64| error_s <= MAX_COUNT_SPEED_ERROR * (pulse_time_s - last_s);
-            if pulse_times_s.last().is_none_or(is_known) {
+            if pulse_times_s.last().is_none_or(speed_is_known) {
                 pulse_times_s.push(pulse_time_s);
-                turns.push(pulses / f64::from(pulses_per_turn));
+                turns.push(pulse_count / f64::from(pulses_per_turn));
             }
         }
         if pulse_times_s.len() < MIN_PULSES {
@@ -192,19 +193,19 @@ impl Pulses {
     }
 
     /// Returns the mean speeds between pulses (rpm), at the times in the middle between them (s).
-    fn speeds(&self) -> (Vec<f64>, Vec<f64>) {
-        let spans = self.pulse_times_s.windows(2).zip(self.turns.windows(2));
-        let speed = |(pulse_times_s, turns): (&[f64], &[f64])| {
+    fn mean_speeds(&self) -> (Vec<f64>, Vec<f64>) {
+        let pulse_pairs = self.pulse_times_s.windows(2).zip(self.turns.windows(2));
+        let time_and_speed = |(pulse_times_s, turns): (&[f64], &[f64])| {
             let speed_rpm = 60.0 * (turns[1] - turns[0]) / (pulse_times_s[1] - pulse_times_s[0]);
             (0.5 * (pulse_times_s[0] + pulse_times_s[1]), speed_rpm)
         };
-        spans.map(speed).unzip()
+        pulse_pairs.map(time_and_speed).unzip()
     }
 
     /// Returns the speed at a time before the pulses (rpm), on the line through the first two
     /// speeds, and the greatest speed.
     pub(super) fn first_and_greatest_rpm(&self, first_s: f64) -> [f64; 2] {
-        let (times_s, speeds) = self.speeds();
+        let (times_s, speeds) = self.mean_speeds();
         let rpm_per_s = (speeds[1] - speeds[0]) / (times_s[1] - times_s[0]);
         let first_rpm = speeds[0] - rpm_per_s * (times_s[0] - first_s);
         [first_rpm.max(0.0), speeds.into_iter().fold(0.0, f64::max)]
@@ -213,7 +214,7 @@ impl Pulses {
     /// Fits the spin. Before the first speed and after the last one it continues down to a
     /// standstill.
     pub(super) fn smooth_spin(&self) -> Option<SmoothedSpin> {
-        let (times_s, speeds) = self.speeds();
+        let (times_s, speeds) = self.mean_speeds();
         let mut smoothed_spin = smooth_spin(&times_s, &speeds)?;
         continue_to_rest(&mut smoothed_spin.spin);
         smoothed_spin.random_spins.iter_mut().for_each(continue_to_rest);
@@ -225,19 +226,19 @@ impl Pulses {
 /// continued to a standstill at time 0 has its first span after that knot.
 fn continue_to_rest(spin: &mut Spin) {
     let Spin::Table { time_s, speed_rpm } = spin else { return };
-    let zero_s = |a: usize, b: usize| {
+    let crossing_time_s = |a: usize, b: usize| {
         let slope = (speed_rpm[b] - speed_rpm[a]) / (time_s[b] - time_s[a]);
         time_s[a] - speed_rpm[a] / slope
     };
-    let last = time_s.len() - 1;
-    let end_s = zero_s(last - 1, last);
-    let start_s = if last > 1 && speed_rpm[0] == 0.0 { zero_s(1, 2) } else { 0.0 };
-    let is_start = start_s > 0.0 && start_s < time_s[1];
-    if end_s.is_finite() && end_s > time_s[last] {
+    let last_knot = time_s.len() - 1;
+    let end_s = crossing_time_s(last_knot - 1, last_knot);
+    let start_s = if last_knot > 1 && speed_rpm[0] == 0.0 { crossing_time_s(1, 2) } else { 0.0 };
+    let starts_late = start_s > 0.0 && start_s < time_s[1];
+    if end_s.is_finite() && end_s > time_s[last_knot] {
         time_s.push(end_s);
         speed_rpm.push(0.0);
     }
-    if is_start {
+    if starts_late {
         time_s.insert(1, start_s);
         speed_rpm.insert(1, 0.0);
     }
@@ -248,19 +249,21 @@ mod tests {
     use super::*;
 
     /// The turns of a drum that stands for a second, runs up to 350 rpm in 12 s and down again.
-    fn turns(t: f64) -> f64 {
-        const RATE: f64 = 350.0 / 60.0 / 12.0;
-        let up = (t - 1.0).clamp(0.0, 12.0);
-        let down = (t - 13.0).clamp(0.0, 12.0);
-        0.5 * RATE * up * up + RATE * down * (12.0 - 0.5 * down)
+    fn drum_turns(t: f64) -> f64 {
+        const TURNS_PER_S_SQUARED: f64 = 350.0 / 60.0 / 12.0;
+        let run_up_s = (t - 1.0).clamp(0.0, 12.0);
+        let run_down_s = (t - 13.0).clamp(0.0, 12.0);
+        0.5 * TURNS_PER_S_SQUARED * run_up_s * run_up_s
+            + TURNS_PER_S_SQUARED * run_down_s * (12.0 - 0.5 * run_down_s)
     }
 
     #[test]
     fn the_spin_by_pulses_keeps_the_drums_angle() {
         let time_s: Vec<f64> = (0..26_000).map(|k| 0.001 * f64::from(k)).collect();
-        let one_pulse_voltage = |t: f64| if (turns(t) + 0.7).fract() < 0.1 { 1.0 } else { 0.0 };
+        let one_pulse_voltage =
+            |t: f64| if (drum_turns(t) + 0.7).fract() < 0.1 { 1.0 } else { 0.0 };
         let twelve_teeth_voltage = |t: f64| {
-            let volts = 2.5 + 2.4 * (std::f64::consts::TAU * 12.0 * turns(t)).sin();
+            let volts = 2.5 + 2.4 * (std::f64::consts::TAU * 12.0 * drum_turns(t)).sin();
             if (1000.0 * t) as u32 % 7 == 3 { f64::NAN } else { volts }
         };
         for (pulses_per_turn, signal) in
@@ -271,17 +274,19 @@ mod tests {
             let pulses = Pulses::read(&time_s, &signal, signal_kind).unwrap();
             let [first_rpm, greatest_rpm] = pulses.first_and_greatest_rpm(0.0);
             assert!(first_rpm < 5.0 && (greatest_rpm - 350.0).abs() < 7.0, "{pulses:?}");
-            let smoothed = pulses.smooth_spin().unwrap();
-            let mut angle = 0.0;
+            let smoothed_spin = pulses.smooth_spin().unwrap();
+            let mut angle_turns = 0.0;
             let mut greatest_error = 0.0_f64;
-            for (t, speed) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
-                greatest_error = greatest_error.max((angle - turns(*t)).abs());
-                angle += speed / 60.0 * 0.001;
+            for (t, speed) in
+                time_s.iter().zip(smoothed_spin.spin.speeds_rpm(time_s.iter().copied()))
+            {
+                greatest_error = greatest_error.max((angle_turns - drum_turns(*t)).abs());
+                angle_turns += speed / 60.0 * 0.001;
             }
             assert!(
                 greatest_error < 0.02,
                 "{pulses_per_turn}: {greatest_error} {:?}",
-                smoothed.spin
+                smoothed_spin.spin
             );
         }
     }
@@ -289,34 +294,37 @@ mod tests {
     #[test]
     fn signals_without_pulses_or_with_too_fast_ones_are_refused() {
         let time_s: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
-        let signal = |period: usize, rows: usize| -> Vec<f64> {
+        let pulse_signal = |period: usize, rows: usize| -> Vec<f64> {
             (0..40).map(|k| if k < rows && k % period == period - 1 { 1.0 } else { 0.0 }).collect()
         };
-        let read_voltage =
+        let read_as_voltage =
             |signal: &[f64]| Pulses::read(&time_s, signal, (PulseSignal::Voltage, 1));
-        assert_eq!(read_voltage(&signal(4, 8)), Err(PulseError::FewPulses(2)));
-        assert_eq!(read_voltage(&[1.0; 40]), Err(PulseError::FewPulses(0)));
-        let count: Vec<f64> = (0..40).map(f64::from).collect();
-        assert_eq!(read_voltage(&count), Err(PulseError::FewPulses(1)));
-        assert_eq!(read_voltage(&signal(2, 40)), Err(PulseError::TooFast(3)));
-        let pulses = read_voltage(&signal(4, 40)).unwrap();
+        assert_eq!(read_as_voltage(&pulse_signal(4, 8)), Err(PulseError::FewPulses(2)));
+        assert_eq!(read_as_voltage(&[1.0; 40]), Err(PulseError::FewPulses(0)));
+        let rising_count: Vec<f64> = (0..40).map(f64::from).collect();
+        assert_eq!(read_as_voltage(&rising_count), Err(PulseError::FewPulses(1)));
+        assert_eq!(read_as_voltage(&pulse_signal(2, 40)), Err(PulseError::TooFast(3)));
+        let pulses = read_as_voltage(&pulse_signal(4, 40)).unwrap();
         assert!((pulses.pulse_times_s[0] - 0.025).abs() < 1e-12, "{pulses:?}");
-        assert!(pulses.speeds().1.iter().all(|speed| (speed - 1500.0).abs() < 1e-6), "{pulses:?}");
+        assert!(
+            pulses.mean_speeds().1.iter().all(|speed| (speed - 1500.0).abs() < 1e-6),
+            "{pulses:?}"
+        );
     }
 
     /// Returns the greatest difference between the angle of the spin by a signal and the drum's
     /// (turns).
     fn angle_error(time_s: &[f64], signal: &[f64], kind: (PulseSignal, u32)) -> f64 {
         let spin = Pulses::read(time_s, signal, kind).unwrap().smooth_spin().unwrap().spin;
-        let mut angle = 0.0;
+        let mut angle_turns = 0.0;
         let mut last_s = 0.0;
         let mut greatest_error = 0.0_f64;
         for k in 0..25_000 {
             let t = 0.001 * f64::from(k);
             let middle_s = 0.5 * (last_s + t);
-            angle += spin.speeds_rpm([middle_s]).next().unwrap() / 60.0 * (t - last_s);
+            angle_turns += spin.speeds_rpm([middle_s]).next().unwrap() / 60.0 * (t - last_s);
             last_s = t;
-            greatest_error = greatest_error.max((angle - turns(t)).abs());
+            greatest_error = greatest_error.max((angle_turns - drum_turns(t)).abs());
         }
         greatest_error
     }
@@ -328,26 +336,27 @@ mod tests {
         {
             let rows = (26.0 / step_s) as u32;
             let time_s: Vec<f64> = (0..rows).map(|k| step_s * f64::from(k)).collect();
-            let pulses = |t: &f64| (f64::from(pulses_per_turn) * (turns(*t) + 0.7)).floor();
-            let count: Vec<f64> = time_s.iter().map(pulses).collect();
+            let pulses_until =
+                |t: &f64| (f64::from(pulses_per_turn) * (drum_turns(*t) + 0.7)).floor();
+            let count: Vec<f64> = time_s.iter().map(pulses_until).collect();
             let error = angle_error(&time_s, &count, (PulseSignal::Count, pulses_per_turn));
             assert!(error < 0.1, "{step_s} {pulses_per_turn}: {error}");
             // A counter of 16 bits overflows, and misses a row.
-            let mut wrapped: Vec<f64> =
+            let mut wrapped_counts: Vec<f64> =
                 count.iter().map(|count| (count + 64_000.0) % 65_536.0).collect();
-            wrapped[7] = f64::NAN;
+            wrapped_counts[7] = f64::NAN;
             let wrapped_error =
-                angle_error(&time_s, &wrapped, (PulseSignal::Count, pulses_per_turn));
+                angle_error(&time_s, &wrapped_counts, (PulseSignal::Count, pulses_per_turn));
             assert!(wrapped_error < 0.1, "{step_s} {pulses_per_turn}: {wrapped_error}");
-            let per_row: Vec<f64> =
+            let counts_per_row: Vec<f64> =
                 (0..count.len()).map(|k| count[k] - count[k.saturating_sub(1)]).collect();
-            let [by_count, by_rows] =
-                [(PulseSignal::Count, &count), (PulseSignal::CountPerRow, &per_row)].map(
+            let [pulses_by_count, pulses_by_row] =
+                [(PulseSignal::Count, &count), (PulseSignal::CountPerRow, &counts_per_row)].map(
                     |(kind, signal)| {
                         Pulses::read(&time_s, signal, (kind, pulses_per_turn)).unwrap()
                     },
                 );
-            assert_eq!(by_count.speeds(), by_rows.speeds());
+            assert_eq!(pulses_by_count.mean_speeds(), pulses_by_row.mean_speeds());
         }
     }
 
@@ -368,14 +377,14 @@ mod tests {
         );
         let single_step = |k: u32| if k < 20 { 0.0 } else { 1.0 };
         assert_eq!(read_signal(PulseSignal::Count, &single_step), Err(PulseError::FewReadings(1)));
-        let with_negative = |k: u32| if k == 3 { -1.0 } else { 1.0 };
+        let negative_count = |k: u32| if k == 3 { -1.0 } else { 1.0 };
         assert_eq!(
-            read_signal(PulseSignal::CountPerRow, &with_negative),
+            read_signal(PulseSignal::CountPerRow, &negative_count),
             Err(PulseError::FallingCount(3))
         );
-        let with_missing = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
+        let missing_count = |k: u32| if k == 3 { f64::NAN } else { 1.0 };
         assert_eq!(
-            read_signal(PulseSignal::CountPerRow, &with_missing),
+            read_signal(PulseSignal::CountPerRow, &missing_count),
             Err(PulseError::MissingCount(3))
         );
     }

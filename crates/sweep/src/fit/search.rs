@@ -9,7 +9,7 @@ use sweep_engine::Error;
 
 /// The least predicted decrease of the cost for which a descent goes on. Basis: a hundredth of a
 /// standard error. Doubling it ends descents a little earlier.
-const MIN_DECREASE: f64 = 2e-4;
+const MIN_COST_DECREASE: f64 = 2e-4;
 /// The greatest predicted decrease of the cost at the end of a descent in which no step achieves
 /// it. Basis: a third of a standard error. Doubling it accepts rougher ends as converged.
 const MAX_UNACHIEVED_DECREASE: f64 = 0.1;
@@ -46,7 +46,7 @@ pub(crate) fn descend(
     let mut evaluations = 1;
     let mut damping = 1e-3;
     let mut step_scale = 1.0;
-    let finish = |x, equations, evaluations, is_converged| {
+    let finish_descent = |x, equations, evaluations, is_converged| {
         Ok(Some(Descent { x, equations, evaluations, is_converged }))
     };
     loop {
@@ -55,41 +55,44 @@ pub(crate) fn descend(
             .filter(|&k| {
                 let [from, to] = ranges[k];
                 let rhs = current.rhs[k];
-                current.normal[k][k] > 0.0
+                current.normal_matrix[k][k] > 0.0
                     && !(x[k] <= from && rhs < 0.0 || x[k] >= to && rhs > 0.0)
             })
             .collect();
         let free_normal: Vec<Vec<f64>> = free_indices
             .iter()
-            .map(|&i| free_indices.iter().map(|&j| current.normal[i][j]).collect())
+            .map(|&i| free_indices.iter().map(|&j| current.normal_matrix[i][j]).collect())
             .collect();
-        let (unit, scale) = scale_to_unit_diagonal(&free_normal);
-        let eigen = EigenDecomposition::from_matrix(&unit);
-        let rhs: Vec<f64> =
-            free_indices.iter().zip(&scale).map(|(&k, s)| current.rhs[k] / s).collect();
-        let solve = |damping: f64| eigen.apply(&rhs, |value| 1.0 / (value.max(0.0) + damping));
+        let (unit_matrix, scales) = scale_to_unit_diagonal(&free_normal);
+        let eigen = EigenDecomposition::from_matrix(&unit_matrix);
+        let scaled_rhs: Vec<f64> =
+            free_indices.iter().zip(&scales).map(|(&k, s)| current.rhs[k] / s).collect();
+        let solve_damped =
+            |damping: f64| eigen.apply(&scaled_rhs, |value| 1.0 / (value.max(0.0) + damping));
         // The decrease of the cost, as predicted by the quadratic model.
-        let predicted_decrease = dot(&solve(MIN_DAMPING), &rhs);
-        if predicted_decrease < MIN_DECREASE {
-            return finish(x, current, evaluations, true);
+        let predicted_decrease = dot(&solve_damped(MIN_DAMPING), &scaled_rhs);
+        if predicted_decrease < MIN_COST_DECREASE {
+            return finish_descent(x, current, evaluations, true);
         }
         loop {
-            let solution = solve(damping);
-            let step: Vec<f64> = solution.iter().zip(&scale).map(|(step, s)| step / s).collect();
+            let solution = solve_damped(damping);
+            let step: Vec<f64> = solution.iter().zip(&scales).map(|(step, s)| step / s).collect();
             let step_length =
                 free_indices.iter().zip(&step).fold(step_scale, |scale_limit: f64, (&k, step)| {
-                    let width = ranges[k][1] - ranges[k][0];
-                    let width = if width.is_finite() { 0.1 * width } else { 0.0 };
-                    let size = x[k].abs().max(start[k].abs()).max(width);
-                    scale_limit.min(MAX_STEP_RATIO * size / step.abs())
+                    let range_width = ranges[k][1] - ranges[k][0];
+                    let magnitude_of_range =
+                        if range_width.is_finite() { 0.1 * range_width } else { 0.0 };
+                    let magnitude = x[k].abs().max(start[k].abs()).max(magnitude_of_range);
+                    scale_limit.min(MAX_STEP_RATIO * magnitude / step.abs())
                 });
-            let mut trial = x.clone();
+            let mut trial_point = x.clone();
             for (&k, step) in free_indices.iter().zip(&step) {
-                trial[k] = (trial[k] + step_length * step).clamp(ranges[k][0], ranges[k][1]);
+                trial_point[k] =
+                    (trial_point[k] + step_length * step).clamp(ranges[k][0], ranges[k][1]);
             }
             // Rounding errors and corners of friction may hide a small decrease.
             if evaluations >= max_evaluations || damping > 1e4 {
-                return finish(
+                return finish_descent(
                     x,
                     current,
                     evaluations,
@@ -97,16 +100,16 @@ pub(crate) fn descend(
                 );
             }
             evaluations += 1;
-            match evaluate(&trial)? {
+            match evaluate(&trial_point)? {
                 Some(trial_equations) if trial_equations.cost < current.cost => {
                     // A large residual makes successful steps too short. The next one is longer by
                     // the ratio of this step's actual and predicted decrease.
                     let decrease_ratio = (current.cost - trial_equations.cost)
-                        / (step_length * dot(&solution, &rhs));
+                        / (step_length * dot(&solution, &scaled_rhs));
                     let extended_step_scale =
                         (step_length / (2.0 - decrease_ratio).max(0.25)).max(1.0);
                     step_scale = if damping > MIN_DAMPING { 1.0 } else { extended_step_scale };
-                    (x, current) = (trial, trial_equations);
+                    (x, current) = (trial_point, trial_equations);
                     damping = (damping * 0.1).max(MIN_DAMPING);
                     break;
                 }
@@ -137,7 +140,7 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
-    fn valley(x: &[f64]) -> Result<Option<NormalEquations>, DescentError> {
+    fn rosenbrock_equations(x: &[f64]) -> Result<Option<NormalEquations>, DescentError> {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
@@ -145,7 +148,7 @@ mod tests {
         Ok(Some(NormalEquations {
             cost: dot(&residual, &residual),
             sigma: vec![1.0; 2],
-            normal,
+            normal_matrix: normal,
             rhs,
         }))
     }
@@ -153,36 +156,43 @@ mod tests {
     #[test]
     fn steps_grow_where_a_large_residual_makes_them_short() {
         // Residuals x + 1 and bend x^2 + x - 1: Gauss and Newton's steps leave `bend` of the way.
-        let bend = 0.97;
+        let curvature = 0.97;
         let evaluate = |x: &[f64]| -> Result<Option<NormalEquations>, DescentError> {
-            let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
-            let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
+            let residual = [x[0] + 1.0, curvature * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
+            let slopes = [-100.0, -100.0 * (2.0 * curvature * x[0] + 1.0)];
             let normal = vec![vec![dot(&slopes, &slopes)]];
             let rhs = vec![dot(&slopes, &residual)];
             Ok(Some(NormalEquations {
                 cost: dot(&residual, &residual),
                 sigma: vec![1.0; 2],
-                normal,
+                normal_matrix: normal,
                 rhs,
             }))
         };
-        let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]];
-        let descent = descend(&[1.0], &unbounded, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();
+        let unbounded_ranges = [[f64::NEG_INFINITY, f64::INFINITY]];
+        let descent =
+            descend(&[1.0], &unbounded_ranges, MAX_EVALUATIONS, &evaluate).unwrap().unwrap();
         assert!(descent.is_converged && descent.evaluations < 40, "{descent:?}");
         assert!(descent.x[0].abs() < 0.01, "{descent:?}");
     }
 
     #[test]
     fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
-        let unbounded = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
-        let descent = descend(&[-1.2, 1.0], &unbounded, MAX_EVALUATIONS, &valley).unwrap().unwrap();
+        let unbounded_ranges = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let descent =
+            descend(&[-1.2, 1.0], &unbounded_ranges, MAX_EVALUATIONS, &rosenbrock_equations)
+                .unwrap()
+                .unwrap();
         assert!(descent.is_converged && descent.evaluations < 60, "{descent:?}");
         assert!(
             (descent.x[0] - 1.0).abs() < 0.02 && (descent.x[1] - 1.0).abs() < 0.04,
             "{descent:?}"
         );
-        let bounded = [[-2.0, 0.5], [-2.0, 2.0]];
-        let descent = descend(&[-1.2, 1.0], &bounded, MAX_EVALUATIONS, &valley).unwrap().unwrap();
+        let bounded_ranges = [[-2.0, 0.5], [-2.0, 2.0]];
+        let descent =
+            descend(&[-1.2, 1.0], &bounded_ranges, MAX_EVALUATIONS, &rosenbrock_equations)
+                .unwrap()
+                .unwrap();
         assert!(
             (descent.x[0] - 0.5).abs() < 1e-9 && (descent.x[1] - 0.25).abs() < 0.02,
             "{descent:?}"

@@ -4,17 +4,17 @@ use serde::Serialize;
 use washer_model::Spin;
 
 use super::algebra::quantile;
-use super::normal_sampler;
+use super::normal_quantile_sampler;
 
 /// The least noise of a tachometer, as a part of its greatest speed. Basis: rounding to five
 /// digits. Doubling it gives exact speeds fewer knots.
 const MIN_NOISE_RATIO: f64 = 1e-5;
 /// The number of positions in a span at which a further knot is tried. Basis: a knot between two of
 /// them is followed by further ones beside it. Doubling it doubles the time.
-const TRIED_POSITIONS: usize = 31;
+const TRIED_KNOT_POSITIONS: usize = 31;
 /// The number of random splines. Basis: a standard deviation of so many draws is known to a sixth.
 /// Doubling it doubles the time of their part of the covariance.
-const RANDOM_SPLINES: u64 = 16;
+const RANDOM_SPLINE_COUNT: u64 = 16;
 /// The greatest number of knots. Basis: an hour of spin cycles has some hundred corners. Doubling
 /// it doubles the longest time.
 const MAX_KNOTS: usize = 1000;
@@ -43,8 +43,8 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         .filter(|(_, speed)| !speed.is_nan())
         .map(|(time, speed)| [*time, *speed])
         .collect();
-    let [first, _] = samples.first()?;
-    let [last, _] = samples.last()?;
+    let [first_s, _] = samples.first()?;
+    let [last_s, _] = samples.last()?;
     let greatest_rpm =
         samples.iter().fold(0.0_f64, |greatest, [_, speed]| greatest.max(speed.abs()));
     let (rounding_rpm, samples_per_step) = estimate_digit_rounding(&samples).unwrap_or((0.0, 0.0));
@@ -53,7 +53,7 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
     // parameter. A step of the tachometer's digits is no reason for a knot.
     let min_gain =
         (3.0 * libm::log(samples.len() as f64)).max(2.0 * samples_per_step) * noise_rpm * noise_rpm;
-    let mut knots = vec![*first, *last];
+    let mut knots = vec![*first_s, *last_s];
     let mut speeds = fit_spline(&samples, &knots)?;
     while knots.len() < MAX_KNOTS {
         let further_knots = find_further_knots(&samples, &knots, &speeds, min_gain);
@@ -64,25 +64,25 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
         knots.sort_by(f64::total_cmp);
         speeds = fit_spline(&samples, &knots)?;
     }
-    let to_spin = |mut speeds: Vec<f64>| {
+    let spin_of_speeds = |mut speeds: Vec<f64>| {
         let mut times = knots.clone();
-        if *first > 0.0 {
+        if *first_s > 0.0 {
             // The spline continues to the start of the run on the line of its first span, which
             // ends at zero.
             let slope = (speeds[1] - speeds[0]) / (knots[1] - knots[0]);
-            let start = speeds[0] - slope * first;
-            let [low, high] = [speeds[0].min(0.0), speeds[0].max(0.0)];
+            let start_rpm = speeds[0] - slope * first_s;
+            let [lower_rpm, upper_rpm] = [speeds[0].min(0.0), speeds[0].max(0.0)];
             times.insert(0, 0.0);
-            speeds.insert(0, start.clamp(low, high));
+            speeds.insert(0, start_rpm.clamp(lower_rpm, upper_rpm));
         }
         Spin::Table { time_s: times, speed_rpm: speeds }
     };
     let (spline_equations, _) = SplineEquations::from_samples(&samples, &knots);
-    let normal_draw = normal_sampler(RANDOM_SPLINES);
-    let draw = |point: u64| {
-        let standard_normal: Vec<f64> = (0..knots.len()).map(|k| normal_draw(point, k)).collect();
-        let deviations = spline_equations.transform_normal(&standard_normal);
-        to_spin(
+    let sample_normal = normal_quantile_sampler(RANDOM_SPLINE_COUNT);
+    let draw_spin = |point: u64| {
+        let standard_normal: Vec<f64> = (0..knots.len()).map(|k| sample_normal(point, k)).collect();
+        let deviations = spline_equations.scale_standard_normal(&standard_normal);
+        spin_of_speeds(
             speeds
                 .iter()
                 .zip(&deviations)
@@ -90,19 +90,20 @@ pub(crate) fn smooth_spin(time_s: &[f64], speed_rpm: &[f64]) -> Option<SmoothedS
                 .collect(),
         )
     };
-    let random_spins = (0..RANDOM_SPLINES).map(draw).collect();
-    Some(SmoothedSpin { spin: to_spin(speeds), noise_rpm, knots: knots.len(), random_spins })
+    let random_spins = (0..RANDOM_SPLINE_COUNT).map(draw_spin).collect();
+    Some(SmoothedSpin { spin: spin_of_speeds(speeds), noise_rpm, knots: knots.len(), random_spins })
 }
 
 /// Estimates the standard deviation of white noise about a smooth curve, from the median of the
 /// distances of samples to the line through their neighbours. Jumps do not change the median.
 fn estimate_noise(samples: &[[f64; 2]]) -> f64 {
     let distances = samples.windows(3).map(|neighbours| {
-        let fraction =
+        let fraction_before =
             (neighbours[1][0] - neighbours[0][0]) / (neighbours[2][0] - neighbours[0][0]);
-        let [before, after] = [1.0 - fraction, fraction];
-        let distance = neighbours[1][1] - before * neighbours[0][1] - after * neighbours[2][1];
-        distance.abs() / (1.0 + before * before + after * after).sqrt()
+        let [weight_before, weight_after] = [1.0 - fraction_before, fraction_before];
+        let distance =
+            neighbours[1][1] - weight_before * neighbours[0][1] - weight_after * neighbours[2][1];
+        distance.abs() / (1.0 + weight_before * weight_before + weight_after * weight_after).sqrt()
     });
     // The median of |x| of a normal distribution.
     quantile(distances, 0.5).map_or(0.0, |median| median / 0.674_489_75)
@@ -112,11 +113,12 @@ fn estimate_noise(samples: &[[f64; 2]]) -> f64 {
 /// usual number of samples between changes of a digit. Neighbouring samples do not show the noise
 /// of such a tachometer, because most of them are equal.
 fn estimate_digit_rounding(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
-    let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
-    let steps = steps.filter(|step| *step > 0.0);
-    let count = steps.clone().count();
-    let step = quantile(steps, 0.5).filter(|_| 2 * count <= samples.len())?;
-    Some((step / 12.0_f64.sqrt(), samples.len() as f64 / count as f64))
+    let changes_rpm = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
+    let digit_changes_rpm = changes_rpm.filter(|step| *step > 0.0);
+    let change_count = digit_changes_rpm.clone().count();
+    let step_rpm =
+        quantile(digit_changes_rpm, 0.5).filter(|_| 2 * change_count <= samples.len())?;
+    Some((step_rpm / 12.0_f64.sqrt(), samples.len() as f64 / change_count as f64))
 }
 
 /// Returns the index of the span in which a time lies, and the part of the span before it.
@@ -128,7 +130,7 @@ fn find_span(knots: &[f64], time_s: f64) -> (usize, f64) {
 /// The normal equations of a spline after elimination. Their matrix is tridiagonal.
 struct SplineEquations {
     diagonal: Vec<f64>,
-    factors: Vec<f64>,
+    elimination_factors: Vec<f64>,
 }
 
 impl SplineEquations {
@@ -146,26 +148,26 @@ impl SplineEquations {
             rhs[k] += complement * speed;
             rhs[k + 1] += fraction * speed;
         }
-        let mut factors = vec![0.0; knots.len()];
+        let mut elimination_factors = vec![0.0; knots.len()];
         for k in 1..knots.len() {
-            factors[k - 1] = off_diagonal[k - 1] / diagonal[k - 1];
-            diagonal[k] -= factors[k - 1] * off_diagonal[k - 1];
-            rhs[k] -= factors[k - 1] * rhs[k - 1];
+            elimination_factors[k - 1] = off_diagonal[k - 1] / diagonal[k - 1];
+            diagonal[k] -= elimination_factors[k - 1] * off_diagonal[k - 1];
+            rhs[k] -= elimination_factors[k - 1] * rhs[k - 1];
         }
         rhs.iter_mut().zip(&diagonal).for_each(|(rhs, pivot)| *rhs /= pivot);
-        (Self { diagonal, factors }, rhs)
+        (Self { diagonal, elimination_factors }, rhs)
     }
 
     fn substitute_back(&self, mut rhs: Vec<f64>) -> Vec<f64> {
         for k in (1..rhs.len()).rev() {
-            rhs[k - 1] -= self.factors[k - 1] * rhs[k];
+            rhs[k - 1] -= self.elimination_factors[k - 1] * rhs[k];
         }
         rhs
     }
 
     /// Transforms independent numbers of variance 1 to numbers whose covariance is the inverse of
     /// the normal matrix.
-    fn transform_normal(&self, standard_normal: &[f64]) -> Vec<f64> {
+    fn scale_standard_normal(&self, standard_normal: &[f64]) -> Vec<f64> {
         self.substitute_back(
             standard_normal
                 .iter()
@@ -191,37 +193,37 @@ fn find_further_knots(
     min_gain: f64,
 ) -> Vec<f64> {
     let mut new_knots = Vec::new();
-    for (span, ends) in knots.windows(2).enumerate() {
-        let from = samples.partition_point(|[time, _]| *time < ends[0]);
-        let to = samples.partition_point(|[time, _]| *time <= ends[1]);
-        let span_samples = &samples[from..to];
-        let mut best = (min_gain, None);
-        for position in 1..=TRIED_POSITIONS {
-            let sample = position * span_samples.len() / (TRIED_POSITIONS + 1);
+    for (span, span_ends) in knots.windows(2).enumerate() {
+        let first_sample = samples.partition_point(|[time, _]| *time < span_ends[0]);
+        let end_sample = samples.partition_point(|[time, _]| *time <= span_ends[1]);
+        let span_samples = &samples[first_sample..end_sample];
+        let mut best_gain_and_knot = (min_gain, None);
+        for position in 1..=TRIED_KNOT_POSITIONS {
+            let sample = position * span_samples.len() / (TRIED_KNOT_POSITIONS + 1);
             // Each span keeps at least a few samples.
             if sample < 3 || sample + 4 > span_samples.len() {
                 continue;
             }
             let knot = span_samples[sample][0];
-            let mut projection = 0.0;
-            let mut hat_square = 0.0;
+            let mut residual_projection = 0.0;
+            let mut hat_square_sum = 0.0;
             for &[time, speed] in span_samples {
-                let fraction = (time - ends[0]) / (ends[1] - ends[0]);
+                let fraction = (time - span_ends[0]) / (span_ends[1] - span_ends[0]);
                 let residual =
                     speed - speeds[span] * (1.0 - fraction) - speeds[span + 1] * fraction;
-                let hat = match time <= knot {
-                    true => (time - ends[0]) / (knot - ends[0]),
-                    false => (ends[1] - time) / (ends[1] - knot),
+                let hat_value = match time <= knot {
+                    true => (time - span_ends[0]) / (knot - span_ends[0]),
+                    false => (span_ends[1] - time) / (span_ends[1] - knot),
                 };
-                projection += hat * residual;
-                hat_square += hat * hat;
+                residual_projection += hat_value * residual;
+                hat_square_sum += hat_value * hat_value;
             }
-            let gain = projection * projection / hat_square;
-            if gain > best.0 {
-                best = (gain, Some(knot));
+            let gain = residual_projection * residual_projection / hat_square_sum;
+            if gain > best_gain_and_knot.0 {
+                best_gain_and_knot = (gain, Some(knot));
             }
         }
-        new_knots.extend(best.1);
+        new_knots.extend(best_gain_and_knot.1);
     }
     new_knots
 }
@@ -233,61 +235,71 @@ mod tests {
 
     #[test]
     fn a_spline_of_noisy_speeds_with_kinks_keeps_the_angle() {
-        let true_speed = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
+        let true_speed_rpm = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
         let normal = Distribution {
             shape: DistributionShape::Normal { mean: 0.0, sd: 1.5 },
             from: -9.0,
             to: 9.0,
         };
-        let generator = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
+        let random_design = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
         let time_s: Vec<f64> = (0..3000).map(|k| 0.003 + 0.004 * f64::from(k)).collect();
-        let speed: Vec<f64> = time_s
+        let noisy_speeds: Vec<f64> = time_s
             .iter()
             .enumerate()
             .map(|(k, t)| {
-                true_speed(*t) + normal.quantile(generator.position(k as u64, 0).unwrap())
+                true_speed_rpm(*t) + normal.quantile(random_design.position(k as u64, 0).unwrap())
             })
             .collect();
-        let smoothed = smooth_spin(&time_s, &speed).unwrap();
-        assert!((smoothed.noise_rpm - 1.5).abs() < 0.1, "{smoothed:?}");
-        assert!((3..12).contains(&smoothed.knots), "{smoothed:?}");
+        let smoothed_spin = smooth_spin(&time_s, &noisy_speeds).unwrap();
+        assert!((smoothed_spin.noise_rpm - 1.5).abs() < 0.1, "{smoothed_spin:?}");
+        assert!((3..12).contains(&smoothed_spin.knots), "{smoothed_spin:?}");
         // At the end of a straight span of n samples: a variance of 4 / n.
-        let Spin::Table { time_s: knots, .. } = &smoothed.spin else { panic!("{smoothed:?}") };
-        let span = (knots[knots.len() - 1] - knots[knots.len() - 2]) / 0.004;
-        let end_speed = |spin: &Spin| spin.speeds_rpm([time_s[2999]]).next().unwrap();
-        let fitted_end = end_speed(&smoothed.spin);
-        let square: f64 =
-            smoothed.random_spins.iter().map(|spin| (end_speed(spin) - fitted_end).powi(2)).sum();
-        let error =
-            (square / smoothed.random_spins.len() as f64).sqrt() / (1.5 * (4.0 / span).sqrt());
-        assert!((0.5..2.0).contains(&error), "{error}");
-        let mut angle = 0.0_f64;
-        let mut worst = 0.0_f64;
-        for (t, spline_rpm) in time_s.iter().zip(smoothed.spin.speeds_rpm(time_s.iter().copied())) {
-            angle += (spline_rpm - true_speed(*t)) / 60.0 * 0.004;
-            worst = worst.max(angle.abs());
+        let Spin::Table { time_s: knots, .. } = &smoothed_spin.spin else {
+            panic!("{smoothed_spin:?}")
+        };
+        let samples_in_last_span = (knots[knots.len() - 1] - knots[knots.len() - 2]) / 0.004;
+        let end_speed_rpm = |spin: &Spin| spin.speeds_rpm([time_s[2999]]).next().unwrap();
+        let fitted_end_rpm = end_speed_rpm(&smoothed_spin.spin);
+        let squared_deviations: f64 = smoothed_spin
+            .random_spins
+            .iter()
+            .map(|spin| (end_speed_rpm(spin) - fitted_end_rpm).powi(2))
+            .sum();
+        let relative_deviation = (squared_deviations / smoothed_spin.random_spins.len() as f64)
+            .sqrt()
+            / (1.5 * (4.0 / samples_in_last_span).sqrt());
+        assert!((0.5..2.0).contains(&relative_deviation), "{relative_deviation}");
+        let mut angle_error_turns = 0.0_f64;
+        let mut greatest_angle_error = 0.0_f64;
+        for (t, spline_rpm) in
+            time_s.iter().zip(smoothed_spin.spin.speeds_rpm(time_s.iter().copied()))
+        {
+            angle_error_turns += (spline_rpm - true_speed_rpm(*t)) / 60.0 * 0.004;
+            greatest_angle_error = greatest_angle_error.max(angle_error_turns.abs());
         }
         // Turns; the noise itself wanders by 1.5 / 60 sqrt(12 * 0.004) = 5e-3.
-        assert!(worst < 0.01, "{worst}");
-        let exact: Vec<f64> = time_s.iter().map(|t| true_speed(*t)).collect();
-        let smoothed = smooth_spin(&time_s, &exact).unwrap();
+        assert!(greatest_angle_error < 0.01, "{greatest_angle_error}");
+        let exact_speeds: Vec<f64> = time_s.iter().map(|t| true_speed_rpm(*t)).collect();
+        let smoothed_exact = smooth_spin(&time_s, &exact_speeds).unwrap();
         let greatest_difference = time_s
             .iter()
-            .zip(smoothed.spin.speeds_rpm(time_s.iter().copied()))
+            .zip(smoothed_exact.spin.speeds_rpm(time_s.iter().copied()))
             .fold(0.0_f64, |greatest, (t, spline_rpm)| {
-                greatest.max((spline_rpm - true_speed(*t)).abs())
+                greatest.max((spline_rpm - true_speed_rpm(*t)).abs())
             });
-        assert!(greatest_difference < 0.2, "{greatest_difference}: {smoothed:?}");
+        assert!(greatest_difference < 0.2, "{greatest_difference}: {smoothed_exact:?}");
         // Speeds that are rounded to whole digits get no further knots.
-        for digit in [1.0, 5.0] {
-            let rounded: Vec<f64> =
-                time_s.iter().map(|t| (true_speed(*t) / digit).round() * digit).collect();
-            let smoothed = smooth_spin(&time_s, &rounded).unwrap();
+        for digit_rpm in [1.0, 5.0] {
+            let rounded_speeds: Vec<f64> = time_s
+                .iter()
+                .map(|t| (true_speed_rpm(*t) / digit_rpm).round() * digit_rpm)
+                .collect();
+            let smoothed_rounded = smooth_spin(&time_s, &rounded_speeds).unwrap();
             assert!(
-                (smoothed.noise_rpm / digit - 12.0_f64.sqrt().recip()).abs() < 1e-9,
-                "{smoothed:?}"
+                (smoothed_rounded.noise_rpm / digit_rpm - 12.0_f64.sqrt().recip()).abs() < 1e-9,
+                "{smoothed_rounded:?}"
             );
-            assert!(smoothed.knots < 12, "{digit}: {smoothed:?}");
+            assert!(smoothed_rounded.knots < 12, "{digit_rpm}: {smoothed_rounded:?}");
         }
     }
 }

@@ -19,12 +19,12 @@ use sweep_engine::{Error, Interrupt, RunContext};
 /// The number of speeds at which the stability of the fitted machine is computed. Basis: bands of
 /// instability of the paper's machine are several times wider than their distance. Doubling it
 /// doubles the time.
-const GROWTH_SPEEDS: u32 = 120;
+const GROWTH_SPEED_COUNT: u32 = 120;
 
 /// The number of directions of fixed numbers' errors that count in a margin, those that move the
 /// estimates most. Basis: the eighth adds some percent to an interval. Doubling it doubles the time
 /// that the interval takes.
-const MARGIN_DIRECTIONS: usize = 8;
+const MAX_MARGIN_DIRECTIONS: usize = 8;
 
 /// The map's row at the fitted machine.
 #[derive(Clone, Debug, Serialize)]
@@ -51,11 +51,11 @@ pub(crate) struct FittedVerdict {
 impl FittedVerdict {
     /// Formats the side of a band of instability on which the machine is, if its growth is known;
     /// the machine is at the edge if the interval of its growth contains 0.
-    pub(super) fn margin(&self, format_short: &dyn Fn(f64) -> String) -> Option<String> {
+    pub(super) fn margin_text(&self, format_short: &dyn Fn(f64) -> String) -> Option<String> {
         let growth = self.growth_per_s?;
         let speed = self.growth_at_rpm?;
         let is_growing = growth > 0.0;
-        let side = match self.growth_95 {
+        let side_text = match self.growth_95 {
             Some([from, to]) if from <= 0.0 && 0.0 <= to => {
                 "at the edge of a band of instability, within its error"
             }
@@ -63,7 +63,7 @@ impl FittedVerdict {
             _ => "outside every band of instability",
         };
         let verb = if is_growing { "grow" } else { "die away" };
-        let interval = self.growth_95.map_or_else(String::new, |ends| {
+        let interval_text = self.growth_95.map_or_else(String::new, |ends| {
             let [from, to] = if is_growing { ends } else { [-ends[1], -ends[0]] };
             format!(" ({} in 95 %)", format_range([from, to], format_short))
         });
@@ -74,9 +74,10 @@ impl FittedVerdict {
             }
             _ => "",
         };
-        let rate = format_short(growth.abs());
+        let rate_text = format_short(growth.abs());
         Some(format!(
-            "{side}: disturbances {verb} by {rate} /s{interval} at {speed:.0} rpm{off_curve_note}"
+            "{side_text}: disturbances {verb} by {rate_text} /s{interval_text} at {speed:.0} \
+             rpm{off_curve_note}"
         ))
     }
 }
@@ -98,8 +99,9 @@ impl FittedMap<'_> {
         let x = self.x;
         // The map has the spin of the grid, because a measured spin has no parameters.
         let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
-        let case_parameters: Vec<usize> =
-            (0..problem.free.len()).filter(|&k| problem.free[k].belongs_to(case)).collect();
+        let case_parameters: Vec<usize> = (0..problem.free_parameters.len())
+            .filter(|&k| problem.free_parameters[k].belongs_to(case))
+            .collect();
         // Free numbers compensate for errors of the fixed ones, which would count twice.
         let covariance = self.statistics.noise_covariance(problem);
         let mut parameter_sets = vec![x.to_vec()];
@@ -107,13 +109,15 @@ impl FittedMap<'_> {
             parameter_sets.extend(draw_parameters(problem, x, &covariance, self.draws));
         }
         for &k in &case_parameters {
-            let values = || parameter_sets.iter().map(|set| set[k]);
-            let from = values().fold(f64::INFINITY, f64::min);
-            let to = values().fold(f64::NEG_INFINITY, f64::max);
-            let parameter = plan.model.parameter(problem.free[k].parameter.clone());
-            plan.axes.push(match from < to {
-                true => axis_between(parameter, from, to),
-                false => Axis { parameter, values: AxisValues::List(vec![from]), tolerance: None },
+            let values_of_parameter = || parameter_sets.iter().map(|set| set[k]);
+            let least_value = values_of_parameter().fold(f64::INFINITY, f64::min);
+            let greatest_value = values_of_parameter().fold(f64::NEG_INFINITY, f64::max);
+            let parameter = plan.model.parameter(problem.free_parameters[k].parameter.clone());
+            plan.axes.push(match least_value < greatest_value {
+                true => axis_between(parameter, least_value, greatest_value),
+                false => {
+                    Axis { parameter, values: AxisValues::List(vec![least_value]), tolerance: None }
+                }
             });
         }
         let points: Vec<Vec<f64>> = parameter_sets
@@ -126,22 +130,23 @@ impl FittedMap<'_> {
         let context = RunContext::with_time_limit(&interrupt, &is_cancelled);
         let rows = engine.evaluate_points(&points, &context).unwrap_or_default();
         let verdicts: Vec<RowVerdict> = rows.iter().map(MapRow::verdict).collect();
-        let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
+        let greatest_ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
         let sample_verdicts = verdicts.get(1..).unwrap_or_default();
-        let reliable =
+        let reliable_count =
             sample_verdicts.iter().filter(|verdict| verdict.reliable == Some(true)).count();
-        let errors = model_follows.then_some(&covariance[..]);
-        let (growth, growth_95) = match self.growth(case, &plan, errors) {
-            Some((growth, interval)) => (Some(growth), interval),
-            None => (None, None),
-        };
+        let free_covariance = model_follows.then_some(&covariance[..]);
+        let (growth, growth_95) =
+            match self.fastest_growth_and_interval(case, &plan, free_covariance) {
+                Some((growth, interval)) => (Some(growth), interval),
+                None => (None, None),
+            };
         Ok(FittedVerdict {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
-            ratio_max: verdicts.first().and_then(ratio),
+            ratio_max: verdicts.first().and_then(greatest_ratio),
             ratio_limit: plan.reliability.limits.upper,
             probability_reliable: (!sample_verdicts.is_empty())
-                .then(|| reliable as f64 / sample_verdicts.len() as f64),
-            ratio_max_95: interval_95(sample_verdicts.iter().filter_map(ratio)),
+                .then(|| reliable_count as f64 / sample_verdicts.len() as f64),
+            ratio_max_95: interval_95(sample_verdicts.iter().filter_map(greatest_ratio)),
             draws: sample_verdicts.len(),
             growth_per_s: growth.map(|growth| growth.fastest.growth_per_s()),
             growth_at_rpm: growth.map(|growth| growth.fastest.speed_rpm),
@@ -152,7 +157,7 @@ impl FittedMap<'_> {
 
     /// Returns the fastest growing disturbance of the fitted machine at speeds up to its greatest,
     /// and the 95 % interval of its growth if the covariance of the free numbers is given.
-    fn growth(
+    fn fastest_growth_and_interval(
         &self,
         case: usize,
         plan: &Plan,
@@ -160,27 +165,29 @@ impl FittedMap<'_> {
     ) -> Option<(Growth, Option<[f64; 2]>)> {
         let x = self.x;
         let (_, spin) = self.problem.machine(case, x);
-        let step_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(GROWTH_SPEEDS);
-        let speeds: Vec<f64> = (GROWTH_SPEEDS / 5..=GROWTH_SPEEDS)
+        let step_rpm =
+            spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(GROWTH_SPEED_COUNT);
+        let speeds: Vec<f64> = (GROWTH_SPEED_COUNT / 5..=GROWTH_SPEED_COUNT)
             .map(|k| step_rpm * f64::from(k))
             .filter(|speed| *speed > 0.0)
             .collect();
-        let growth = fastest_growth(&self.responses_at(case, plan, (x, &[]), &speeds)?)?;
-        let interval = covariance
-            .and_then(|covariance| self.growth_95(case, plan, (&growth, step_rpm), covariance));
+        let growth = fastest_growth(&self.find_responses_at(case, plan, (x, &[]), &speeds)?)?;
+        let interval = covariance.and_then(|covariance| {
+            self.growth_interval_95(case, plan, (&growth, step_rpm), covariance)
+        });
         Some((growth, interval))
     }
 
     /// Returns the responses of a case's machine at some speeds, with changed fixed numbers.
-    fn responses_at(
+    fn find_responses_at(
         &self,
         case: usize,
         plan: &Plan,
-        (x, fixed): (&[f64], &[(MachineParameter, f64)]),
+        (x, fixed_changes): (&[f64], &[(MachineParameter, f64)]),
         speeds: &[f64],
     ) -> Option<Vec<Result<Vec<Response>, Status>>> {
         let (mut machine, mut spin) = self.problem.machine(case, x);
-        for (parameter, change) in fixed {
+        for (parameter, change) in fixed_changes {
             if let Some(value) = parameter.get(&machine, &spin) {
                 parameter.set(&mut machine, &mut spin, value + change);
             }
@@ -198,7 +205,7 @@ impl FittedMap<'_> {
     /// noise and of the fixed numbers' errors, with the compensation by the free numbers, to first
     /// order. The upper end includes growth between two speeds. The result is `None` if a varied
     /// machine has no response.
-    fn growth_95(
+    fn growth_interval_95(
         &self,
         case: usize,
         plan: &Plan,
@@ -208,54 +215,61 @@ impl FittedMap<'_> {
         let x = self.x;
         let middle_rpm = growth.fastest.speed_rpm;
         let speeds = [middle_rpm - step_rpm, middle_rpm, middle_rpm + step_rpm];
-        let growths = |x: &[f64], fixed: &[(MachineParameter, f64)]| -> Option<Vec<f64>> {
-            let responses = self.responses_at(case, plan, (x, fixed), &speeds)?;
+        let growths_at = |x: &[f64],
+                          fixed_changes: &[(MachineParameter, f64)]|
+         -> Option<Vec<f64>> {
+            let responses = self.find_responses_at(case, plan, (x, fixed_changes), &speeds)?;
             responses
                 .iter()
-                .map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s()))
+                .map(|response_result| Some(response_result.as_ref().ok()?.first()?.growth_per_s()))
                 .collect()
         };
         let greatest_growth =
             |growths: &[f64]| growths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let fitted = growths(x, &[])?;
+        let fitted_growths = growths_at(x, &[])?;
         let mut slopes = vec![0.0; covariance.len()];
-        for (k, free) in self.problem.free.iter().enumerate() {
+        for (k, free) in self.problem.free_parameters.iter().enumerate() {
             let error = covariance[k][k].max(0.0).sqrt();
             if !free.belongs_to(case) || error == 0.0 {
                 continue;
             }
-            let mut varied = x.to_vec();
+            let mut varied_unknowns = x.to_vec();
             let step = if x[k] + error > free.range[1] { -error } else { error };
-            varied[k] = (x[k] + step).max(free.range[0]);
-            let change = greatest_growth(&growths(&varied, &[])?) - greatest_growth(&fitted);
-            if varied[k] != x[k] {
-                slopes[k] = change / (varied[k] - x[k]);
+            varied_unknowns[k] = (x[k] + step).max(free.range[0]);
+            let growth_change = greatest_growth(&growths_at(&varied_unknowns, &[])?)
+                - greatest_growth(&fitted_growths);
+            if varied_unknowns[k] != x[k] {
+                slopes[k] = growth_change / (varied_unknowns[k] - x[k]);
             }
         }
         let mut variance: f64 =
             covariance.iter().zip(&slopes).map(|(row, slope)| slope * dot(row, &slopes)).sum();
-        for direction in self.statistics.influences.directions.iter().take(MARGIN_DIRECTIONS) {
+        for direction in self.statistics.influences.directions.iter().take(MAX_MARGIN_DIRECTIONS) {
             // A number at an end of its range can change in one direction only.
-            let growths = [1.0, -1.0].into_iter().find_map(|sign| {
-                let moved_value = |(k, (x, by)): (usize, (&f64, &f64))| {
+            let varied_growths = [1.0, -1.0].into_iter().find_map(|sign| {
+                let varied_value = |(k, (x, by)): (usize, (&f64, &f64))| {
                     let [from, to] = self.problem.unknown_range(k);
                     (x - sign * by).clamp(from, to)
                 };
-                let moves = x.iter().zip(&direction.effects).enumerate();
-                let varied: Vec<f64> = moves.map(moved_value).collect();
+                let unknowns_and_effects = x.iter().zip(&direction.effects).enumerate();
+                let varied: Vec<f64> = unknowns_and_effects.map(varied_value).collect();
                 let changes = direction.changes.iter();
-                let changes: Vec<(MachineParameter, f64)> =
+                let signed_changes: Vec<(MachineParameter, f64)> =
                     changes.map(|(parameter, by)| (parameter.clone(), sign * by)).collect();
-                growths(&varied, &changes)
+                growths_at(&varied, &signed_changes)
             });
-            let change = greatest_growth(&growths?) - greatest_growth(&fitted);
+            let change = greatest_growth(&varied_growths?) - greatest_growth(&fitted_growths);
             variance += change * change;
         }
         let half_width = Z_975 * variance.max(0.0).sqrt();
         // The vertex of the parabola through three neighbours is at most this far above the middle.
-        let rise = (2.0 * fitted[1] - fitted[0] - fitted[2]).max(0.0) / 8.0;
-        let value = growth.fastest.growth_per_s();
-        Some([value - half_width, value + half_width + rise])
+        let rise_between_speeds =
+            (2.0 * fitted_growths[1] - fitted_growths[0] - fitted_growths[2]).max(0.0) / 8.0;
+        let fitted_growth_per_s = growth.fastest.growth_per_s();
+        Some([
+            fitted_growth_per_s - half_width,
+            fitted_growth_per_s + half_width + rise_between_speeds,
+        ])
     }
 }
 
@@ -265,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_margin_within_its_error_is_at_the_edge() {
-        let margin_text = |growth: f64, interval: Option<[f64; 2]>| {
+        let format_margin = |growth: f64, interval: Option<[f64; 2]>| {
             let verdict = FittedVerdict {
                 reliable: None,
                 ratio_max: None,
@@ -278,9 +292,9 @@ mod tests {
                 growth_95: interval,
                 growth_on_curve: Some(true),
             };
-            verdict.margin(&|value| format!("{value:.1}")).unwrap()
+            verdict.margin_text(&|value| format!("{value:.1}")).unwrap()
         };
-        for (growth, interval, expected) in [
+        for (growth, interval, expected_text) in [
             (
                 0.1,
                 Some([-0.1, 0.3]),
@@ -312,7 +326,7 @@ mod tests {
                 250 rpm",
             ),
         ] {
-            assert_eq!(margin_text(growth, interval), expected);
+            assert_eq!(format_margin(growth, interval), expected_text);
         }
     }
 }

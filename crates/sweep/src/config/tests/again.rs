@@ -25,12 +25,12 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
 #[test]
 fn a_plan_is_read_back_from_its_json() {
     let mut plan = WasherGridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
-    let reload = |plan: &crate::Plan| {
+    let reload_from_json = |plan: &crate::Plan| {
         let input = WasherGridInput::from_plan("again", &plan.to_json());
         input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
     };
-    assert_eq!(reload(&plan), plan);
-    // A machine with stops, whose metric needs no held speeds.
+    assert_eq!(reload_from_json(&plan), plan);
+    // This machine has stops, and the metric of stop forces needs no held speeds.
     plan.model.measures.metrics = vec![Metric::StopForce];
     plan.model.held_speeds = None;
     plan.model.machine = with_one_of_each();
@@ -39,5 +39,5 @@ fn a_plan_is_read_back_from_its_json() {
         .to_vec();
     plan.model.measures.stops = plan.model.machine.stops.len();
     plan.model.measures.feet = plan.model.machine.feet.len();
-    assert_eq!(reload(&plan), plan);
+    assert_eq!(reload_from_json(&plan), plan);
 }

@@ -10,14 +10,19 @@ const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
 fn find_axis_columns(columns: &[(&str, &[f64])]) -> Result<Vec<Option<usize>>, String> {
     let plan = WasherGridInput::text("plan", GRID.to_owned(), Vec::new()).load().unwrap();
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
-    let values = |k: usize| columns[k].1.iter().map(|&value| value.is_finite().then_some(value));
-    check_columns(&plan, &names, values).map_err(|mistakes| mistakes.to_string())
+    let finite_values =
+        |k: usize| columns[k].1.iter().map(|&value| value.is_finite().then_some(value));
+    check_columns(&plan, &names, finite_values).map_err(|mistakes| mistakes.to_string())
 }
 
 #[test]
 fn a_million_mistakes_are_counted() {
-    let text = find_axis_columns(&[("unbalance_mass_kg", &[9.0; 1_000_000])]).unwrap_err();
-    assert!(text.contains("1000000 mistakes (100 shown)"), "{}", &text[text.len() - 200..]);
+    let message = find_axis_columns(&[("unbalance_mass_kg", &[9.0; 1_000_000])]).unwrap_err();
+    assert!(
+        message.contains("1000000 mistakes (100 shown)"),
+        "{}",
+        &message[message.len() - 200..]
+    );
 }
 
 #[test]
@@ -32,7 +37,7 @@ fn columns_are_found_by_name_and_an_axis_of_one_value_may_be_left_out() {
 
 #[test]
 fn every_mistake_names_its_column_and_row() {
-    for (columns, part) in [
+    for (columns, message_part) in [
         (&[("unbalance_mass", &[0.1][..])][..], "did you mean `unbalance_mass_kg`"),
         (&[("unbalance_mass", &[0.1][..])][..], "has no column `unbalance_mass_kg`"),
         (&[("unbalance_mass_kg", &[0.1, 0.6])], "row 2 of `unbalance_mass_kg` = 0.6 is off"),
@@ -47,7 +52,7 @@ fn every_mistake_names_its_column_and_row() {
             "`shaft_mass_kg` is no axis of this plan",
         ),
     ] {
-        let text = find_axis_columns(columns).unwrap_err();
-        assert!(text.contains(part), "{text}");
+        let message = find_axis_columns(columns).unwrap_err();
+        assert!(message.contains(message_part), "{message}");
     }
 }
