@@ -27,9 +27,9 @@ use crate::plan::point_input;
 use sweep_engine::RowSource;
 use sweep_files::panics::lock;
 
-/// Number of points that are prepared together. Basis: the searches for speed amplitudes of friction
-/// take different numbers of runs, and with four points per lane the lanes of most runs are full.
-/// Doubling it makes threads wait longer for the first runs.
+/// Number of points that are prepared together. Basis: the searches for speed amplitudes of
+/// friction take different numbers of runs, and with four points per lane the lanes of most runs
+/// are full. Doubling it makes threads wait longer for the first runs.
 const PREPARE_BATCH: usize = 4 * MAX_LANES;
 
 /// Returns the number of runs by a method that a thread takes at once.
