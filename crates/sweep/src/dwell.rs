@@ -292,7 +292,7 @@ impl AttractorEngine {
 /// model's range.
 fn final_state(attractors: &Attractors) -> CarriedState {
     let motion = attractors.attractors.first()?;
-    (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end)
+    (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end_state)
 }
 
 #[cfg(test)]

@@ -143,7 +143,7 @@ pub struct Attractor {
     pub time_s: f64,
     /// The last state at which the unbalance is up: coordinates (m, rad), then their speeds
     /// (per s).
-    pub end: [f64; STATES],
+    pub end_state: [f64; STATES],
     /// The states at which the unbalance is up, of at most the last 256 turns; coordinates are from
     /// equilibrium.
     pub sections: Vec<[f64; STATES]>,
@@ -277,7 +277,7 @@ fn record_motions<'a, 'f>(
         let is_in_range =
             |motion: &&mut Attractor| !matches!(motion.status, AttractorStatus::LeftRange { .. });
         for motion in attractors.attractors.iter_mut().filter(is_in_range) {
-            held_states.push(HeldState { setup: *setup, state: motion.end });
+            held_states.push(HeldState { setup: *setup, state: motion.end_state });
             motions.push(motion);
         }
     }
@@ -403,13 +403,13 @@ impl<'a> SpeedSearch<'a> {
         let point = held_case.setup.point;
         let frozen_modes: Arc<Modes> = Arc::clone(&held_case.frozen_modes);
         let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
-        let kicked_state = responses.first().map_or(rest_state, |response| response.start);
+        let kicked_state = responses.first().map_or(rest_state, |response| response.start_state);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));
         if let Some(carried_state) = carried_state {
             states.push((perturb(point, &frozen_modes, &carried_state), Origin::Carried));
         } else {
-            let response_states = responses.iter().map(|response| response.start);
+            let response_states = responses.iter().map(|response| response.start_state);
             let response_states: Vec<_> =
                 if responses.is_empty() { vec![kicked_state] } else { response_states.collect() };
             let to_perturbed_start =
@@ -447,7 +447,8 @@ impl<'a> SpeedSearch<'a> {
         let held_state = HeldState { setup: self.held_case.setup, state };
         let is_unstable = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable_responses = self.responses.iter().filter(is_unstable);
-        let unstable_orbits = unstable_responses.map(|response| vec![response.start]).collect();
+        let unstable_orbits =
+            unstable_responses.map(|response| vec![response.start_state]).collect();
         self.trajectories.push(HeldTrajectory::new(held_state, unstable_orbits, self.max_time_s));
         self.origins.push(origin);
     }

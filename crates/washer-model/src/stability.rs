@@ -92,7 +92,7 @@ pub struct Response {
     pub linear_peaks: [f64; CHANNELS],
     /// The state of the nonlinear response at which the unbalance is up: coordinates q1 to q10 (m,
     /// rad), then their speeds (per s).
-    pub start: [f64; STATES],
+    pub start_state: [f64; STATES],
     /// The Floquet multiplier of the nonlinear response, real and imaginary part (not negative):
     /// the largest of those that belong to motions of the suspension. Motions of the bearings are
     /// excluded, because their modes are capped; motions of the hinge are excluded if the hinge's

@@ -294,7 +294,7 @@ mod tests {
             min_gap_m: 0.01,
             exponent: None,
             time_s: 60.0,
-            end: [0.0; washer_model::STATE_LEN],
+            end_state: [0.0; washer_model::STATE_LEN],
             sections: Vec::new(),
             extra: Reading::default(),
         }

@@ -102,7 +102,7 @@ mod tests {
                 exceeded_limit: None,
                 nonlinear_peaks: [0.0; Channel::ALL.len()],
                 linear_peaks: [0.0; Channel::ALL.len()],
-                start: [0.0; STATE_LEN],
+                start_state: [0.0; STATE_LEN],
                 multiplier: [-1.2, 0.0],
                 participating_modes: Vec::new(),
             }])

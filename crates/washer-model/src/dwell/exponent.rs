@@ -88,15 +88,16 @@ pub(super) fn compute_exponents(
                 continue;
             };
             let setup = run_pairs[2 * k].setup;
-            let separation = state_distance(&setup, &reference_turn.end, &perturbed_turn.end);
+            let separation =
+                state_distance(&setup, &reference_turn.end_state, &perturbed_turn.end_state);
             if let Some(measured_turn) = turn.checked_sub(TRANSIENT_TURNS) {
                 growth_in_parts[k][measured_turn / PART_TURNS] +=
                     libm::log(separation / initial_separations);
             }
-            run_pairs[2 * k].state = reference_turn.end;
+            run_pairs[2 * k].state = reference_turn.end_state;
             run_pairs[2 * k + 1].state = core::array::from_fn(|i| {
-                reference_turn.end[i]
-                    + (perturbed_turn.end[i] - reference_turn.end[i])
+                reference_turn.end_state[i]
+                    + (perturbed_turn.end_state[i] - reference_turn.end_state[i])
                         * (initial_separations / separation)
             });
         }

@@ -34,7 +34,7 @@ pub(super) fn compute_growths_per_s(
             .iter()
             .map(|&k| TurnRequest {
                 setup: orbits[k].held_state.setup,
-                start: states[k],
+                start_state: states[k],
                 is_recorded: true,
             })
             .collect();
@@ -43,7 +43,7 @@ pub(super) fn compute_growths_per_s(
             return vec![None; orbits.len()];
         }
         for (k, result) in unfinished_orbits.into_iter().zip(results) {
-            states[k] = result.end;
+            states[k] = result.end_state;
             if let Some(record) = result.record {
                 monodromy_matrices[k] = Some(match &monodromy_matrices[k] {
                     Some(previous) => multiply_matrices(&record.monodromy, previous),

@@ -286,7 +286,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let held_case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
         let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
         let response =
-            search_result.responses.first().map_or(state_at_rest, |response| response.start);
+            search_result.responses.first().map_or(state_at_rest, |response| response.start_state);
         let held_states: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
             .map(|kick| {
                 let mut state = if kick % 2 == 0 { state_at_rest } else { response };
@@ -364,8 +364,8 @@ fn continue_in_short_steps(
     let point = prepare_at(keys, speed_rpm, TURNS as f64 * turn_s);
     let equilibrium = point.equilibrium();
     let initial_deviation = InitialDeviation {
-        deviations: core::array::from_fn(|i| motion.end[i] - equilibrium[i]),
-        speeds: core::array::from_fn(|i| motion.end[COORDINATES + i]),
+        deviations: core::array::from_fn(|i| motion.end_state[i] - equilibrium[i]),
+        speeds: core::array::from_fn(|i| motion.end_state[COORDINATES + i]),
     };
     let method = Method::rk4(STEP_S);
     let history = integrate_history(

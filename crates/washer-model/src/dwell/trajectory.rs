@@ -181,7 +181,7 @@ impl<'a> HeldTrajectory<'a> {
             .rev()
             .step_by(interval_turns)
             .take(SURVIVOR_COUNT)
-            .map(|turn| turn.end)
+            .map(|turn| turn.end_state)
             .collect()
     }
 
@@ -221,7 +221,7 @@ impl<'a> HeldTrajectory<'a> {
         let surplus_turns = self.turns.len().saturating_sub(2 * WINDOW_TURNS);
         self.turns.drain(..surplus_turns);
         if let Some(last_turn) = self.turns.last() {
-            self.held_state.state = last_turn.end;
+            self.held_state.state = last_turn.end_state;
         }
         // Near an unstable orbit a trajectory looks settled, and needs further turns.
         if !self.is_near_unstable_orbit() {
@@ -273,7 +273,8 @@ impl<'a> HeldTrajectory<'a> {
                 return self.mark_settled(MotionKind::Periodic { turns: period });
             }
             Some(_) => {
-                let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
+                let orbit =
+                    self.turns.iter().rev().take(period as usize).map(|turn| turn.end_state);
                 self.unstable_orbits.push(orbit.collect());
             }
             None => {}
@@ -337,8 +338,12 @@ impl<'a> HeldTrajectory<'a> {
             exponent: self.exponent,
             least_kick_rad_per_s: None,
             time_s: self.time_s(),
-            end: self.held_state.state,
-            sections: self.turns.iter().map(|turn| self.subtract_equilibrium(&turn.end)).collect(),
+            end_state: self.held_state.state,
+            sections: self
+                .turns
+                .iter()
+                .map(|turn| self.subtract_equilibrium(&turn.end_state))
+                .collect(),
             extra: Reading::default(),
         }
     }
@@ -354,7 +359,7 @@ impl<'a> HeldTrajectory<'a> {
             let orbit_distance = |turn: &TurnRecord| {
                 let distances = orbit
                     .iter()
-                    .map(|state| state_distance(&self.held_state.setup, &turn.end, state));
+                    .map(|state| state_distance(&self.held_state.setup, &turn.end_state, state));
                 distances.fold(f64::INFINITY, f64::min) / orbit_size
             };
             let max_distance =
@@ -380,12 +385,12 @@ impl<'a> HeldTrajectory<'a> {
     fn find_period(&self, tolerance: f64) -> Option<u32> {
         let first_turn = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
         let deviation =
-            |turn: &TurnRecord| largest_deviation(self.held_state.setup.point, &turn.end);
+            |turn: &TurnRecord| largest_deviation(self.held_state.setup.point, &turn.end_state);
         let motion_size = self.turns[first_turn..].iter().map(deviation).fold(0.0, f64::max);
         let repeats_after = |period: &usize| {
             *period <= first_turn
                 && (first_turn..self.turns.len()).all(|k| {
-                    let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end);
+                    let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end_state);
                     state_distance(&self.held_state.setup, state, earlier) < tolerance * motion_size
                 })
         };
@@ -410,8 +415,8 @@ impl<'a> HeldTrajectory<'a> {
             let change_at = |k: usize| {
                 state_distance(
                     &self.held_state.setup,
-                    &self.turns[k].end,
-                    &self.turns[k + window_turns].end,
+                    &self.turns[k].end_state,
+                    &self.turns[k + window_turns].end_state,
                 )
             };
             (from..from + window_turns).map(change_at).fold(0.0, f64::max)
@@ -428,7 +433,7 @@ impl<'a> HeldTrajectory<'a> {
     /// a turn is below `max_residual`.
     fn find_two_frequencies(&self, max_residual: f64) -> Option<MotionKind> {
         let state_signal =
-            |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
+            |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end_state[i]).collect() };
         let line = find_strongest_line(&[state_signal(TUB_YAW), state_signal(TUB_PITCH)])?;
         let frequency_cpm = line.frequency * self.held_state.setup.speed_rpm;
         (line.residual < max_residual).then_some(MotionKind::QuasiPeriodic { frequency_cpm })

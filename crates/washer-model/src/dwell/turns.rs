@@ -23,7 +23,7 @@ pub(super) struct HeldState<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct TurnRecord {
     /// The state at the end of the turn.
-    pub(super) end: [f64; STATES],
+    pub(super) end_state: [f64; STATES],
     /// The largest deviations from equilibrium (m, rad).
     pub(super) peaks: [f64; CHANNELS],
     /// The least gap between drum and tub at the ends of steps (m).
@@ -134,7 +134,7 @@ fn integrate_lanes<T: Lane>(
             if lanes_in_range >> lane & 1 == 1 && records.len() == finished_turns {
                 let radial_m = recorder.max_radial_squared.0.get(lane).sqrt();
                 records.push(TurnRecord {
-                    end: core::array::from_fn(|i| states[0][i].0.get(lane)),
+                    end_state: core::array::from_fn(|i| states[0][i].0.get(lane)),
                     peaks: recorder.peaks.lane_peaks(lane),
                     min_gap_m: held_state.setup.point.clearance_m() - radial_m,
                 });

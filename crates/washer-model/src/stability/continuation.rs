@@ -128,13 +128,13 @@ const MAX_COORDINATE: f64 = 1.0;
 /// A point of the curve: the state and the logarithm of the drum's speed, each over its unit.
 type CurvePoint = [f64; CURVE_DIMENSION];
 
-fn dot(a: &CurvePoint, b: &CurvePoint) -> f64 {
+fn dot_product(a: &CurvePoint, b: &CurvePoint) -> f64 {
     (0..CURVE_DIMENSION).fold(0.0, |sum, i| sum + a[i] * b[i])
 }
 
 fn normalize(direction: &CurvePoint) -> CurvePoint {
-    let size = dot(direction, direction).sqrt();
-    direction.map(|entry| entry / size)
+    let norm = dot_product(direction, direction).sqrt();
+    direction.map(|entry| entry / norm)
 }
 
 fn add_scaled(origin: &CurvePoint, scale: f64, direction: &CurvePoint) -> CurvePoint {
@@ -176,46 +176,46 @@ struct Node {
     /// The monodromy matrix, at the node itself or at a nearby point.
     monodromy: StateMatrix,
     /// The number of steps of the node's turn, if forces have corners.
-    steps: Option<usize>,
+    step_count: Option<usize>,
 }
 
 /// Interpolates between two nodes, at a share of the arclength. Returns the point of the cubic
 /// through both nodes with their tangents, and its derivative by the arclength.
-fn interpolate_nodes(a: &Node, b: &Node, share: f64) -> (CurvePoint, CurvePoint) {
-    let length = b.arclength - a.arclength;
-    let t = share;
-    let u = 1.0 - share;
+fn interpolate_nodes(a: &Node, b: &Node, arclength_share: f64) -> (CurvePoint, CurvePoint) {
+    let arclength_difference = b.arclength - a.arclength;
+    let t = arclength_share;
+    let u = 1.0 - arclength_share;
     let position = core::array::from_fn(|i| {
-        u * u * ((1.0 + 2.0 * t) * a.position[i] + t * length * a.tangent[i])
-            + t * t * ((1.0 + 2.0 * u) * b.position[i] - u * length * b.tangent[i])
+        u * u * ((1.0 + 2.0 * t) * a.position[i] + t * arclength_difference * a.tangent[i])
+            + t * t * ((1.0 + 2.0 * u) * b.position[i] - u * arclength_difference * b.tangent[i])
     });
-    let slope = core::array::from_fn(|i| {
-        let chord = 6.0 * t * u * (b.position[i] - a.position[i]) / length;
-        chord + u * (1.0 - 3.0 * t) * a.tangent[i] + t * (1.0 - 3.0 * u) * b.tangent[i]
+    let derivative = core::array::from_fn(|i| {
+        let chord_slope = 6.0 * t * u * (b.position[i] - a.position[i]) / arclength_difference;
+        chord_slope + u * (1.0 - 3.0 * t) * a.tangent[i] + t * (1.0 - 3.0 * u) * b.tangent[i]
     });
-    (position, slope)
+    (position, derivative)
 }
 
 /// Returns the number from 0 to 1 up to which a condition holds, by bisection.
 fn bisect(is_before: impl Fn(f64) -> bool) -> f64 {
-    let mut low = 0.0;
-    let mut high = 1.0;
+    let mut lower_bound = 0.0;
+    let mut upper_bound = 1.0;
     for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if is_before(middle) { low = middle } else { high = middle }
+        let midpoint = 0.5 * (lower_bound + upper_bound);
+        if is_before(midpoint) { lower_bound = midpoint } else { upper_bound = midpoint }
     }
-    0.5 * (low + high)
+    0.5 * (lower_bound + upper_bound)
 }
 
 /// A predictor-corrector step: the predicted point, and the plane through it in which it is
 /// corrected.
 #[derive(Clone)]
 struct CorrectorStep {
-    predicted: CurvePoint,
-    normal: CurvePoint,
-    corrections: usize,
+    predicted_point: CurvePoint,
+    plane_normal: CurvePoint,
+    correction_count: usize,
     /// The number of corrections with the current Jacobian.
-    corrections_since_jacobian: usize,
+    correction_count_since_jacobian: usize,
     residual: f64,
     /// The linearised equations of the curve, once they are computed.
     jacobian: Option<Box<CurveJacobian>>,
@@ -233,7 +233,7 @@ struct CurveJacobian {
 #[derive(Clone, Copy)]
 struct FoldBracket {
     /// The index of the node at which the interval begins.
-    first_node: usize,
+    first_node_index: usize,
     /// The number of remaining iterations for the fold; zero if the fold is known and the interval
     /// is next to it.
     iterations_left: usize,
@@ -270,7 +270,7 @@ pub(super) struct ResponseCurve<'a> {
     goes_down: bool,
     nodes: Vec<Node>,
     /// The indices of the nodes at which the speed turns back.
-    fold_nodes: Vec<usize>,
+    fold_node_indices: Vec<usize>,
     /// The current point of the corrector.
     position: CurvePoint,
     /// The length of the next step.
@@ -291,7 +291,7 @@ impl<'a> ResponseCurve<'a> {
             end_rpm: 0.0,
             goes_down: false,
             nodes: Vec::new(),
-            fold_nodes: Vec::new(),
+            fold_node_indices: Vec::new(),
             position: [0.0; CURVE_DIMENSION],
             step_length: FIRST_STEP_LENGTH,
             uses_all_instants: false,
@@ -301,30 +301,31 @@ impl<'a> ResponseCurve<'a> {
     }
 
     /// Begins the continuation from a response at a speed (rpm) up or down to another speed.
-    pub(super) fn begin(&mut self, speed_rpm: f64, start: &[f64; STATES], end_rpm: f64) {
+    pub(super) fn begin(&mut self, speed_rpm: f64, start_state: &[f64; STATES], end_rpm: f64) {
         self.end_rpm = end_rpm;
         self.goes_down = end_rpm < speed_rpm;
-        let mut normal = [0.0; CURVE_DIMENSION];
-        normal[LOG_SPEED_INDEX] = if self.goes_down { -1.0 } else { 1.0 };
-        self.start_correction(to_curve_point(start, speed_rpm), normal);
+        let mut plane_normal = [0.0; CURVE_DIMENSION];
+        plane_normal[LOG_SPEED_INDEX] = if self.goes_down { -1.0 } else { 1.0 };
+        self.start_correction(to_curve_point(start_state, speed_rpm), plane_normal);
     }
 
     /// Predicts the next point of the curve, or ends the continuation.
     fn predict_next(&mut self) {
         self.step = None;
-        let Some(last) = self.nodes.last() else { return };
-        let last_rpm = to_speed_rpm(&last.position);
+        let Some(last_node) = self.nodes.last() else { return };
+        let last_rpm = to_speed_rpm(&last_node.position);
         let node_count = self.nodes.len();
-        let is_out_of_range =
-            (0..COORDINATES).any(|i| (last.position[i] * COORDINATE_UNIT).abs() > MAX_COORDINATE);
+        let is_out_of_range = (0..COORDINATES)
+            .any(|i| (last_node.position[i] * COORDINATE_UNIT).abs() > MAX_COORDINATE);
         let first_rpm = to_speed_rpm(&self.nodes[0].position);
         let [low_rpm, high_rpm] = match self.goes_down {
             true => [self.end_rpm.next_up(), first_rpm.next_up()],
             false => [first_rpm, self.end_rpm],
         };
         let is_within_range = (low_rpm..high_rpm).contains(&last_rpm);
-        let is_stalled_since =
-            |previous: &Node| last.arclength - previous.arclength < FIRST_STEP_LENGTH;
+        let is_stalled_since = |previous_node: &Node| {
+            last_node.arclength - previous_node.arclength < FIRST_STEP_LENGTH
+        };
         let is_stalled = node_count > MAX_STALLED_NODES
             && is_stalled_since(&self.nodes[node_count - MAX_STALLED_NODES])
             && !self.settings.point.machine.elements.has_nonsmooth_force();
@@ -335,7 +336,7 @@ impl<'a> ResponseCurve<'a> {
             // A curve has stairs if the steps of a turn are longer than the width of corners, and
             // jumps if the number of steps changes with the speed. Shorter steps of a turn may
             // allow the continuation to proceed.
-            let max_kept_arclength = last.arclength - FIRST_STEP_LENGTH;
+            let max_kept_arclength = last_node.arclength - FIRST_STEP_LENGTH;
             if !self.goes_down && self.settings.refine_continuation() {
                 let kept_node_count =
                     self.nodes.partition_point(|node| node.arclength < max_kept_arclength).max(1);
@@ -346,15 +347,17 @@ impl<'a> ResponseCurve<'a> {
             return;
         }
         // The predictor of second order: the tangent, and its change in the last step.
-        let mut predicted = add_scaled(&last.position, self.step_length, &last.tangent);
+        let mut predicted_point =
+            add_scaled(&last_node.position, self.step_length, &last_node.tangent);
         if node_count > 1 {
-            let previous = &self.nodes[node_count - 2];
-            let factor =
-                0.5 * self.step_length * self.step_length / (last.arclength - previous.arclength);
-            let tangent_change = core::array::from_fn(|i| last.tangent[i] - previous.tangent[i]);
-            predicted = add_scaled(&predicted, factor, &tangent_change);
+            let previous_node = &self.nodes[node_count - 2];
+            let curvature_factor = 0.5 * self.step_length * self.step_length
+                / (last_node.arclength - previous_node.arclength);
+            let tangent_change =
+                core::array::from_fn(|i| last_node.tangent[i] - previous_node.tangent[i]);
+            predicted_point = add_scaled(&predicted_point, curvature_factor, &tangent_change);
         }
-        self.start_correction(predicted, last.tangent);
+        self.start_correction(predicted_point, last_node.tangent);
     }
 
     /// Multiplies the length of the next step by a factor.
@@ -365,14 +368,14 @@ impl<'a> ResponseCurve<'a> {
     }
 
     /// Starts the corrector at a predicted point, in the plane with this normal.
-    fn start_correction(&mut self, predicted: CurvePoint, normal: CurvePoint) {
-        self.position = predicted;
+    fn start_correction(&mut self, predicted_point: CurvePoint, plane_normal: CurvePoint) {
+        self.position = predicted_point;
         let residual = f64::INFINITY;
         self.step = Some(CorrectorStep {
-            predicted,
-            normal,
-            corrections: 0,
-            corrections_since_jacobian: 0,
+            predicted_point,
+            plane_normal,
+            correction_count: 0,
+            correction_count_since_jacobian: 0,
             residual,
             jacobian: None,
         });
@@ -382,8 +385,8 @@ impl<'a> ResponseCurve<'a> {
     fn reject_step(&mut self) {
         match self.fold_bracket.take() {
             // A fold that cannot be located more accurately is taken at the last node.
-            Some(FoldBracket { first_node, iterations_left }) if iterations_left > 0 => {
-                self.fold_nodes.push(first_node + 1)
+            Some(FoldBracket { first_node_index, iterations_left }) if iterations_left > 0 => {
+                self.fold_node_indices.push(first_node_index + 1)
             }
             Some(_) => {}
             None => self.scale_step(0.5),
@@ -405,34 +408,34 @@ impl<'a> ResponseCurve<'a> {
         let mut matrix = [[N(0.0); CURVE_DIMENSION]; CURVE_DIMENSION];
         for i in 0..STATES {
             for j in 0..STATES {
-                let identity = f64::from(u8::from(i == j));
+                let identity_entry = f64::from(u8::from(i == j));
                 matrix[i][j] =
-                    N(monodromy[i][j].0 * (component_unit(j) / component_unit(i)) - identity);
+                    N(monodromy[i][j].0 * (component_unit(j) / component_unit(i)) - identity_entry);
             }
-            let derivative =
-                (faster_turn.end[i] - turn.end[i]) / libm::log1p(RELATIVE_SPEED_DIFFERENCE);
-            matrix[i][LOG_SPEED_INDEX] = N(derivative * LOG_SPEED_UNIT / component_unit(i));
+            let speed_derivative = (faster_turn.end_state[i] - turn.end_state[i])
+                / libm::log1p(RELATIVE_SPEED_DIFFERENCE);
+            matrix[i][LOG_SPEED_INDEX] = N(speed_derivative * LOG_SPEED_UNIT / component_unit(i));
         }
-        matrix[LOG_SPEED_INDEX] = step.normal.map(N);
+        matrix[LOG_SPEED_INDEX] = step.plane_normal.map(N);
         let Some(factors) = factor_matrix(&matrix) else { return self.reject_step() };
         let jacobian = Box::new(CurveJacobian { monodromy, factors });
         self.correct_position(
-            CorrectorStep { jacobian: Some(jacobian), corrections_since_jacobian: 0, ..step },
-            &turn.end,
+            CorrectorStep { jacobian: Some(jacobian), correction_count_since_jacobian: 0, ..step },
+            &turn.end_state,
         );
     }
 
     /// Corrects the current point, from the state at the end of a turn that starts at this point.
-    fn correct_position(&mut self, mut step: CorrectorStep, end: &[f64; STATES]) {
+    fn correct_position(&mut self, mut step: CorrectorStep, end_state: &[f64; STATES]) {
         let Some(jacobian) = &step.jacobian else { return self.reject_step() };
         let speed_rpm = to_speed_rpm(&self.position);
         let residual =
-            relative_residual(self.settings.point, speed_rpm, &to_state(&self.position), end);
+            relative_residual(self.settings.point, speed_rpm, &to_state(&self.position), end_state);
         let converges_slowly =
-            step.corrections > 1 && residual > MAX_RESIDUAL_RATIO * step.residual;
+            step.correction_count > 1 && residual > MAX_RESIDUAL_RATIO * step.residual;
         if !residual.is_finite()
-            || step.corrections == MAX_CORRECTIONS
-            || converges_slowly && step.corrections_since_jacobian == 0
+            || step.correction_count == MAX_CORRECTIONS
+            || converges_slowly && step.correction_count_since_jacobian == 0
         {
             return self.reject_step();
         }
@@ -443,38 +446,40 @@ impl<'a> ResponseCurve<'a> {
             self.step = Some(step);
             return;
         }
-        let end = to_curve_point(end, speed_rpm);
-        let mut gap = [N(0.0); CURVE_DIMENSION];
+        let end_point = to_curve_point(end_state, speed_rpm);
+        let mut defect = [N(0.0); CURVE_DIMENSION];
         for i in 0..STATES {
-            gap[i] = N(self.position[i] - end[i]);
+            defect[i] = N(self.position[i] - end_point[i]);
         }
-        let offset: CurvePoint = core::array::from_fn(|i| step.predicted[i] - self.position[i]);
-        gap[LOG_SPEED_INDEX] = N(dot(&step.normal, &offset));
-        let correction = jacobian.factors.solve(&gap);
+        let offset: CurvePoint =
+            core::array::from_fn(|i| step.predicted_point[i] - self.position[i]);
+        defect[LOG_SPEED_INDEX] = N(dot_product(&step.plane_normal, &offset));
+        let correction = jacobian.factors.solve(&defect);
         self.position = core::array::from_fn(|i| self.position[i] + correction[i].0);
-        let offset: CurvePoint = core::array::from_fn(|i| self.position[i] - step.predicted[i]);
-        let offset = dot(&offset, &offset);
+        let offset: CurvePoint =
+            core::array::from_fn(|i| self.position[i] - step.predicted_point[i]);
+        let offset = dot_product(&offset, &offset);
         if offset.is_nan() || offset > MAX_STEP_LENGTH * MAX_STEP_LENGTH {
             return self.reject_step();
         }
-        step.corrections += 1;
-        step.corrections_since_jacobian += 1;
+        step.correction_count += 1;
+        step.correction_count_since_jacobian += 1;
         step.residual = residual;
         if residual < NODE_TOLERANCE { self.accept_step(step) } else { self.step = Some(step) }
     }
 
     /// Whether the speed increases along the curve after the last node. Each fold reverses it.
     fn is_rising(&self) -> bool {
-        self.fold_nodes.len().is_multiple_of(2) != self.goes_down
+        self.fold_node_indices.len().is_multiple_of(2) != self.goes_down
     }
 
     /// Computes the last node again, with the derivatives at the node itself.
     fn recompute_last_node(&mut self) {
         self.scale_step(0.5);
-        if let Some(last) = self.nodes.pop() {
+        if let Some(last_node) = self.nodes.pop() {
             // If the node is a fold, it will be found again.
-            self.fold_nodes.retain(|fold| *fold < self.nodes.len());
-            self.start_correction(last.position, last.tangent);
+            self.fold_node_indices.retain(|fold| *fold < self.nodes.len());
+            self.start_correction(last_node.position, last_node.tangent);
         }
     }
 
@@ -486,37 +491,38 @@ impl<'a> ResponseCurve<'a> {
         right_hand_side[LOG_SPEED_INDEX] = N(1.0);
         let tangent = jacobian.factors.solve(&right_hand_side).map(|entry| entry.0);
         let tangent = normalize(&tangent);
-        let previous = match self.fold_bracket {
-            Some(bracket) => self.nodes.get(bracket.first_node),
+        let previous_node = match self.fold_bracket {
+            Some(bracket) => self.nodes.get(bracket.first_node_index),
             None => self.nodes.last(),
         };
-        let distance = |origin: &CurvePoint| {
+        let distance_from = |origin: &CurvePoint| {
             let difference: CurvePoint = core::array::from_fn(|i| self.position[i] - origin[i]);
-            dot(&difference, &difference).sqrt()
+            dot_product(&difference, &difference).sqrt()
         };
-        let correction = distance(&step.predicted);
+        let correction_distance = distance_from(&step.predicted_point);
         let mut arclength = 0.0;
         let mut turns_back = false;
-        if let Some(previous) = previous {
-            let chord = distance(&previous.position);
-            let cosine = dot(&previous.tangent, &tangent);
+        if let Some(previous_node) = previous_node {
+            let chord = distance_from(&previous_node.position);
+            let cosine = dot_product(&previous_node.tangent, &tangent);
             let has_turned = cosine.is_nan() || cosine < MIN_TANGENT_COSINE;
-            if has_turned || correction > MAX_CORRECTION_SHARE * chord {
+            if has_turned || correction_distance > MAX_CORRECTION_SHARE * chord {
                 // If the last node's tangent is that of a nearby point, the node is computed again,
                 // because shorter steps would also fail.
-                let has_own_tangent = previous.has_own_tangent || self.fold_bracket.is_some();
+                let has_own_tangent = previous_node.has_own_tangent || self.fold_bracket.is_some();
                 return if has_own_tangent {
                     self.reject_step()
                 } else {
                     self.recompute_last_node()
                 };
             }
-            arclength = previous.arclength + chord;
+            arclength = previous_node.arclength + chord;
             // Close to a fold the sign of the tangent's speed is uncertain. The number of folds
             // gives the direction, so that two close folds are not merged.
             turns_back = self.is_rising() == (tangent[LOG_SPEED_INDEX] < 0.0);
         }
-        let has_own_tangent = correction < MAX_OWN_TANGENT_DISTANCE && self.uses_all_instants;
+        let has_own_tangent =
+            correction_distance < MAX_OWN_TANGENT_DISTANCE && self.uses_all_instants;
         let monodromy = jacobian.monodromy;
         let node = Node {
             position: self.position,
@@ -524,27 +530,29 @@ impl<'a> ResponseCurve<'a> {
             has_own_tangent,
             arclength,
             monodromy,
-            steps: self.settings.steps_at_corners(),
+            step_count: self.settings.steps_at_corners(),
         };
         if let Some(bracket) = self.fold_bracket {
             return self.narrow_fold_bracket(node, bracket);
         }
         self.nodes.push(node);
-        if step.corrections <= MAX_CORRECTIONS_TO_GROW {
+        if step.correction_count <= MAX_CORRECTIONS_TO_GROW {
             self.scale_step(STEP_INCREASE_FACTOR);
-        } else if step.corrections >= MIN_CORRECTIONS_TO_SHRINK {
+        } else if step.correction_count >= MIN_CORRECTIONS_TO_SHRINK {
             self.scale_step(STEP_DECREASE_FACTOR);
         }
         if turns_back {
-            let first_node = self.nodes.len() - 2;
-            if self.nodes[first_node].tangent[LOG_SPEED_INDEX] * tangent[LOG_SPEED_INDEX] < 0.0 {
+            let first_node_index = self.nodes.len() - 2;
+            if self.nodes[first_node_index].tangent[LOG_SPEED_INDEX] * tangent[LOG_SPEED_INDEX]
+                < 0.0
+            {
                 self.interpolate_fold(FoldBracket {
-                    first_node,
+                    first_node_index,
                     iterations_left: MAX_FOLD_ITERATIONS,
                 });
             } else {
                 // The curve turned back twice about the last fold.
-                self.fold_nodes.push(first_node + 1);
+                self.fold_node_indices.push(first_node_index + 1);
                 self.predict_next();
             }
         } else {
@@ -555,56 +563,66 @@ impl<'a> ResponseCurve<'a> {
     /// Inserts a node into an interval in which the speed turns back, and continues in the half
     /// with the fold.
     fn narrow_fold_bracket(&mut self, node: Node, bracket: FoldBracket) {
-        let FoldBracket { first_node, iterations_left } = bracket;
-        let [before, after] = [&self.nodes[first_node], &self.nodes[first_node + 1]];
+        let FoldBracket { first_node_index, iterations_left } = bracket;
+        let [before, after] = [&self.nodes[first_node_index], &self.nodes[first_node_index + 1]];
         let curvature = (after.tangent[LOG_SPEED_INDEX] - before.tangent[LOG_SPEED_INDEX])
             / (after.arclength - before.arclength);
-        let slope = node.tangent[LOG_SPEED_INDEX];
-        let error = 0.5 * slope * slope / curvature.abs() * LOG_SPEED_UNIT;
-        let is_before = before.tangent[LOG_SPEED_INDEX] * slope > 0.0;
-        self.nodes.insert(first_node + 1, node);
+        let speed_slope = node.tangent[LOG_SPEED_INDEX];
+        let error = 0.5 * speed_slope * speed_slope / curvature.abs() * LOG_SPEED_UNIT;
+        let is_before_fold = before.tangent[LOG_SPEED_INDEX] * speed_slope > 0.0;
+        self.nodes.insert(first_node_index + 1, node);
         if iterations_left == 0 {
-            if let Some(fold) = self.fold_nodes.last_mut().filter(|fold| **fold > first_node) {
+            if let Some(fold) =
+                self.fold_node_indices.last_mut().filter(|fold| **fold > first_node_index)
+            {
                 *fold += 1;
             }
             return self.add_nodes_at_fold();
         }
         if error < FOLD_TOLERANCE || iterations_left == 1 {
-            self.fold_nodes.push(first_node + 1);
+            self.fold_node_indices.push(first_node_index + 1);
             return self.add_nodes_at_fold();
         }
-        let first_node = if is_before { first_node + 1 } else { first_node };
-        self.interpolate_fold(FoldBracket { first_node, iterations_left: iterations_left - 1 });
+        let first_node_index = if is_before_fold { first_node_index + 1 } else { first_node_index };
+        self.interpolate_fold(FoldBracket {
+            first_node_index,
+            iterations_left: iterations_left - 1,
+        });
     }
 
     /// Adds nodes on both sides of the last fold, where two branches are close together.
     fn add_nodes_at_fold(&mut self) {
         self.fold_bracket = None;
-        let Some(&fold) = self.fold_nodes.last() else { return self.predict_next() };
-        let is_long_interval = |first_node: usize| {
-            let pair = self.nodes.get(first_node).zip(self.nodes.get(first_node + 1));
+        let Some(&fold) = self.fold_node_indices.last() else { return self.predict_next() };
+        let is_long_interval = |first_node_index: usize| {
+            let pair = self.nodes.get(first_node_index).zip(self.nodes.get(first_node_index + 1));
             pair.is_some_and(|(a, b)| b.arclength - a.arclength > MAX_NODE_DISTANCE_AT_FOLD)
         };
-        let Some(first_node) =
-            [fold - 1, fold].into_iter().find(|&first_node| is_long_interval(first_node))
+        let Some(first_node_index) = [fold - 1, fold]
+            .into_iter()
+            .find(|&first_node_index| is_long_interval(first_node_index))
         else {
             return self.predict_next();
         };
-        let (position, slope) =
-            interpolate_nodes(&self.nodes[first_node], &self.nodes[first_node + 1], 0.5);
+        let (position, slope) = interpolate_nodes(
+            &self.nodes[first_node_index],
+            &self.nodes[first_node_index + 1],
+            0.5,
+        );
         self.start_correction(position, normalize(&slope));
-        self.fold_bracket = Some(FoldBracket { first_node, iterations_left: 0 });
+        self.fold_bracket = Some(FoldBracket { first_node_index, iterations_left: 0 });
     }
 
     /// Starts a correction at the fold of the cubic through the nodes of an interval.
     fn interpolate_fold(&mut self, bracket: FoldBracket) {
         let [before, after] =
-            [&self.nodes[bracket.first_node], &self.nodes[bracket.first_node + 1]];
+            [&self.nodes[bracket.first_node_index], &self.nodes[bracket.first_node_index + 1]];
         let is_rising = before.tangent[LOG_SPEED_INDEX] > 0.0;
-        let fraction = bisect(|fraction| {
-            (interpolate_nodes(before, after, fraction).1[LOG_SPEED_INDEX] > 0.0) == is_rising
+        let arclength_share = bisect(|arclength_share| {
+            (interpolate_nodes(before, after, arclength_share).1[LOG_SPEED_INDEX] > 0.0)
+                == is_rising
         });
-        let (position, slope) = interpolate_nodes(before, after, fraction);
+        let (position, slope) = interpolate_nodes(before, after, arclength_share);
         self.start_correction(position, normalize(&slope));
         self.fold_bracket = Some(bracket);
     }
@@ -613,23 +631,23 @@ impl<'a> ResponseCurve<'a> {
     /// in speed first, as long as their difference times the number of steps of a turn is below
     /// [`SPURIOUS_FOLD_TOLERANCE`]. The number of steps is that of the pair's own nodes, because
     /// later parts of the curve may have shorter steps.
-    fn genuine_folds(&self) -> Vec<usize> {
-        let mut folds = self.fold_nodes.clone();
+    fn genuine_fold_indices(&self) -> Vec<usize> {
+        let mut fold_indices = self.fold_node_indices.clone();
         let difference_in_steps = |pair: &[usize]| {
             let [first, second] = [&self.nodes[pair[0]], &self.nodes[pair[1]]];
-            let steps = first.steps.min(second.steps)?;
+            let step_count = first.step_count.min(second.step_count)?;
             let log_speeds = first.position[LOG_SPEED_INDEX] - second.position[LOG_SPEED_INDEX];
-            Some((log_speeds * LOG_SPEED_UNIT).abs() * steps as f64)
+            Some((log_speeds * LOG_SPEED_UNIT).abs() * step_count as f64)
         };
         loop {
-            let pairs = folds.windows(2).map(difference_in_steps).enumerate();
-            let differences = pairs.filter_map(|(pair, steps)| Some((pair, steps?)));
+            let pairs = fold_indices.windows(2).map(difference_in_steps).enumerate();
+            let differences = pairs.filter_map(|(pair, step_count)| Some((pair, step_count?)));
             let nearest_pair = differences.min_by(|a, b| a.1.total_cmp(&b.1));
             match nearest_pair {
                 Some((pair, difference)) if difference < SPURIOUS_FOLD_TOLERANCE => {
-                    folds.drain(pair..pair + 2);
+                    fold_indices.drain(pair..pair + 2);
                 }
-                _ => return folds,
+                _ => return fold_indices,
             }
         }
     }
@@ -644,18 +662,19 @@ impl<'a> ResponseCurve<'a> {
 
     /// Returns the number of folds.
     pub(super) fn fold_count(&self) -> u32 {
-        self.genuine_folds().len() as u32
+        self.genuine_fold_indices().len() as u32
     }
 
     /// Returns the guesses of all responses of the curve at a speed (rpm), in the curve's order.
-    pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
+    pub(super) fn guesses_at(&self, speed_rpm: f64) -> Vec<Guess> {
         let is_past_overshoot = |node: &Node| {
             !self.goes_down && to_speed_rpm(&node.position) >= OVERSHOOT_RATIO * speed_rpm
         };
-        let end = self.nodes.iter().position(is_past_overshoot);
-        let nodes = &self.nodes[..end.map_or(self.nodes.len(), |end| end + 1)];
+        let overshoot_index = self.nodes.iter().position(is_past_overshoot);
+        let nodes = &self.nodes
+            [..overshoot_index.map_or(self.nodes.len(), |overshoot_index| overshoot_index + 1)];
         let target_log_speed = libm::log(speed_rpm) / LOG_SPEED_UNIT;
-        let folds = self.genuine_folds();
+        let fold_indices = self.genuine_fold_indices();
         let mut guesses = Vec::new();
         for (k, pair) in nodes.windows(2).enumerate() {
             let [a, b] = pair else { continue };
@@ -672,21 +691,23 @@ impl<'a> ResponseCurve<'a> {
             if !contains_target {
                 continue;
             }
-            let fraction = bisect(|fraction| {
-                (interpolate_nodes(a, b, fraction).0[LOG_SPEED_INDEX] < target_log_speed)
+            let arclength_share = bisect(|arclength_share| {
+                (interpolate_nodes(a, b, arclength_share).0[LOG_SPEED_INDEX] < target_log_speed)
                     == is_rising
             });
             let interpolate_entry = |i: usize, j: usize| {
-                (1.0 - fraction) * a.monodromy[i][j].0 + fraction * b.monodromy[i][j].0
+                (1.0 - arclength_share) * a.monodromy[i][j].0
+                    + arclength_share * b.monodromy[i][j].0
             };
             let monodromy =
                 core::array::from_fn(|i| core::array::from_fn(|j| N(interpolate_entry(i, j))));
-            let branch = folds.iter().filter(|&&fold| fold <= k).count();
-            let fold = |number: usize| {
-                let node = *folds.get(number)?;
+            let branch = fold_indices.iter().filter(|&&fold| fold <= k).count();
+            let fold_speed_rpm = |number: usize| {
+                let node = *fold_indices.get(number)?;
                 nodes.get(node).map(|node| to_speed_rpm(&node.position))
             };
-            let bounds_rpm = [branch.checked_sub(1).and_then(fold), fold(branch)];
+            let bounds_rpm =
+                [branch.checked_sub(1).and_then(fold_speed_rpm), fold_speed_rpm(branch)];
             guesses.push(Guess {
                 branch: branch as u32,
                 fold_speeds_rpm: if (branch % 2 == 0) != self.goes_down {
@@ -694,7 +715,7 @@ impl<'a> ResponseCurve<'a> {
                 } else {
                     [bounds_rpm[1], bounds_rpm[0]]
                 },
-                state: to_state(&interpolate_nodes(a, b, fraction).0),
+                state: to_state(&interpolate_nodes(a, b, arclength_share).0),
                 factors: factor_fixed_point_equations(&monodromy),
                 is_on_curve: !self.goes_down,
             });
@@ -712,13 +733,13 @@ impl<'a> PeriodMapSearch<'a> for ResponseCurve<'a> {
             return Vec::new();
         };
         if self.uses_all_instants {
-            setup.instants = setup.instants.max(INSTANTS_PER_TURN);
+            setup.instant_count = setup.instant_count.max(INSTANTS_PER_TURN);
         }
-        let start = to_state(&self.position);
-        let mut requests = vec![TurnRequest { setup, start, is_recorded }];
+        let start_state = to_state(&self.position);
+        let mut requests = vec![TurnRequest { setup, start_state, is_recorded }];
         if is_recorded {
             let setup = setup.at_nearby_speed(setup.speed_rpm * (1.0 + RELATIVE_SPEED_DIFFERENCE));
-            requests.push(TurnRequest { setup, start, is_recorded: false });
+            requests.push(TurnRequest { setup, start_state, is_recorded: false });
         }
         requests
     }
@@ -726,7 +747,7 @@ impl<'a> PeriodMapSearch<'a> for ResponseCurve<'a> {
     fn receive_results(&mut self, results: Vec<TurnResult>) {
         match (self.step.take(), results.as_slice()) {
             (Some(step), [turn, faster_turn]) => self.receive_jacobian(step, turn, faster_turn),
-            (Some(step), [turn]) => self.correct_position(step, &turn.end),
+            (Some(step), [turn]) => self.correct_position(step, &turn.end_state),
             _ => {}
         }
     }
@@ -739,7 +760,7 @@ mod tests {
     use crate::stability::tests::{idle_stop, prepared};
 
     /// Returns the paper's machine, with a stop that has no force if `has_stop`.
-    fn point(has_stop: bool) -> crate::Point {
+    fn prepare_point(has_stop: bool) -> crate::Point {
         let mut machine = Machine::paper();
         machine.stops.extend(has_stop.then(idle_stop));
         prepared(machine, 100.0)
@@ -747,13 +768,13 @@ mod tests {
 
     /// Returns a curve through the given speeds (rpm) at an arclength of 1 from each other, with
     /// folds at the given nodes.
-    fn curve<'a>(
+    fn new_curve<'a>(
         point: &'a crate::Point,
         speeds_rpm: &[f64],
         folds: &[usize],
     ) -> ResponseCurve<'a> {
         let mut curve = ResponseCurve::new(Settings::new(point));
-        let steps = curve.settings.steps_at_corners();
+        let step_count = curve.settings.steps_at_corners();
         for (k, &speed_rpm) in speeds_rpm.iter().enumerate() {
             let position = to_curve_point(&[0.0; STATES], speed_rpm);
             let tangent = [0.0; CURVE_DIMENSION];
@@ -764,10 +785,10 @@ mod tests {
                 has_own_tangent: true,
                 arclength: k as f64,
                 monodromy,
-                steps,
+                step_count,
             });
         }
-        curve.fold_nodes = folds.to_vec();
+        curve.fold_node_indices = folds.to_vec();
         curve
     }
 
@@ -775,8 +796,8 @@ mod tests {
     fn a_stair_of_steps_at_corners_is_no_fold_of_the_machine() {
         let speeds_rpm = [200.0, 220.05, 220.0, 240.0, 230.0, 260.0];
         let branches_at = |has_stop: bool, speed_rpm: f64| {
-            let point = point(has_stop);
-            let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4]).guesses(speed_rpm);
+            let point = prepare_point(has_stop);
+            let guesses = new_curve(&point, &speeds_rpm, &[1, 2, 3, 4]).guesses_at(speed_rpm);
             guesses
                 .iter()
                 .map(|guess| (guess.branch, guess.fold_speeds_rpm[1].is_some()))
@@ -793,44 +814,45 @@ mod tests {
     /// parts.
     #[test]
     fn stairs_are_measured_by_their_own_steps() {
-        let point = point(true);
-        let mut curve = curve(&point, &[200.0, 220.05, 220.0, 240.0, 230.0, 260.0], &[1, 2, 3, 4]);
+        let point = prepare_point(true);
+        let mut curve =
+            new_curve(&point, &[200.0, 220.05, 220.0, 240.0, 230.0, 260.0], &[1, 2, 3, 4]);
         while curve.settings.refine_continuation() {}
-        let branches = |speed_rpm: f64| {
-            let guesses = curve.guesses(speed_rpm).into_iter();
+        let branches_at = |speed_rpm: f64| {
+            let guesses = curve.guesses_at(speed_rpm).into_iter();
             guesses.map(|guess| guess.branch).collect::<Vec<_>>()
         };
-        assert_eq!(branches(225.0), [0]);
-        assert_eq!(branches(250.0), [2]);
+        assert_eq!(branches_at(225.0), [0]);
+        assert_eq!(branches_at(250.0), [2]);
     }
 
     /// Checks that the fold itself remains if several stairs are near it.
     #[test]
     fn stairs_by_a_fold_leave_its_farthest_speed() {
-        let point = point(true);
-        let steps = Settings::new(&point).steps_at_corners().unwrap() as f64;
-        let stair_rpm = |height_steps: f64| 230.0 * libm::exp(height_steps / steps);
+        let point = prepare_point(true);
+        let step_count = Settings::new(&point).steps_at_corners().unwrap() as f64;
+        let stair_rpm = |height_steps: f64| 230.0 * libm::exp(height_steps / step_count);
         let mut speeds_rpm = vec![200.0];
         speeds_rpm.extend([0.0, -0.2, 0.4, -0.4, 0.0].map(stair_rpm));
         speeds_rpm.extend([171.0, 260.0]);
-        let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses(190.0);
+        let guesses = new_curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses_at(190.0);
         let [backward_guess, forward_guess] = &guesses[..] else {
             panic!("{} guesses", guesses.len())
         };
         assert_eq!([backward_guess.branch, forward_guess.branch], [1, 2]);
-        let is_at = |end_rpm: Option<f64>, rpm: f64| (end_rpm.unwrap() - rpm).abs() < 1e-9;
+        let is_at_speed = |end_rpm: Option<f64>, rpm: f64| (end_rpm.unwrap() - rpm).abs() < 1e-9;
         assert!(
-            is_at(backward_guess.fold_speeds_rpm[0], 171.0),
+            is_at_speed(backward_guess.fold_speeds_rpm[0], 171.0),
             "{:?}",
             backward_guess.fold_speeds_rpm
         );
         assert!(
-            is_at(backward_guess.fold_speeds_rpm[1], stair_rpm(0.4)),
+            is_at_speed(backward_guess.fold_speeds_rpm[1], stair_rpm(0.4)),
             "{:?}",
             backward_guess.fold_speeds_rpm
         );
         assert!(
-            is_at(forward_guess.fold_speeds_rpm[0], 171.0),
+            is_at_speed(forward_guess.fold_speeds_rpm[0], 171.0),
             "{:?}",
             forward_guess.fold_speeds_rpm
         );
@@ -839,41 +861,41 @@ mod tests {
 
     #[test]
     fn a_fold_that_is_looked_at_again_is_not_counted_twice() {
-        let point = point(false);
-        let mut curve = curve(&point, &[200.0, 220.0, 240.0], &[1, 2]);
+        let point = prepare_point(false);
+        let mut curve = new_curve(&point, &[200.0, 220.0, 240.0], &[1, 2]);
         curve.recompute_last_node();
-        assert_eq!((curve.nodes.len(), curve.fold_nodes), (2, vec![1]));
+        assert_eq!((curve.nodes.len(), curve.fold_node_indices), (2, vec![1]));
     }
 
     /// Two folds within a step leave the direction of the curve unchanged.
     #[test]
     fn a_curve_that_turns_twice_about_a_fold_has_two() {
-        let point = point(false);
-        let mut curve = curve(&point, &[220.0, 230.0], &[1]);
-        let mut upward = [0.0; CURVE_DIMENSION];
-        upward[LOG_SPEED_INDEX] = 1.0;
+        let point = prepare_point(false);
+        let mut curve = new_curve(&point, &[220.0, 230.0], &[1]);
+        let mut upward_tangent = [0.0; CURVE_DIMENSION];
+        upward_tangent[LOG_SPEED_INDEX] = 1.0;
         for node in &mut curve.nodes {
-            node.tangent = upward;
+            node.tangent = upward_tangent;
         }
-        let identity = |i: usize, j: usize| N(f64::from(u8::from(i == j)));
-        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| identity(i, j)));
+        let identity_entry = |i: usize, j: usize| N(f64::from(u8::from(i == j)));
+        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| identity_entry(i, j)));
         let factors = factor_matrix::<CURVE_DIMENSION>(&matrix).unwrap();
         let jacobian = CurveJacobian { monodromy: [[N(0.0); STATES]; STATES], factors };
-        curve.start_correction(to_curve_point(&[0.0; STATES], 240.0), upward);
+        curve.start_correction(to_curve_point(&[0.0; STATES], 240.0), upward_tangent);
         let step = curve.step.take().unwrap();
         curve.end_rpm = 300.0;
         curve.accept_step(CorrectorStep { jacobian: Some(Box::new(jacobian)), ..step });
-        assert_eq!((curve.nodes.len(), &curve.fold_nodes[..]), (3, &[1, 2][..]));
+        assert_eq!((curve.nodes.len(), &curve.fold_node_indices[..]), (3, &[1, 2][..]));
         assert!(curve.fold_bracket.is_none() && curve.is_rising());
     }
 
     #[test]
     fn a_curve_followed_down_has_its_branches_the_other_way_round() {
-        let point = point(false);
-        let mut curve = curve(&point, &[260.0, 220.0, 240.0, 200.0], &[1, 2]);
+        let point = prepare_point(false);
+        let mut curve = new_curve(&point, &[260.0, 220.0, 240.0, 200.0], &[1, 2]);
         curve.goes_down = true;
         let branches_at = |speed_rpm: f64| {
-            let guesses = curve.guesses(speed_rpm).into_iter();
+            let guesses = curve.guesses_at(speed_rpm).into_iter();
             guesses
                 .map(|guess| {
                     (

@@ -53,13 +53,13 @@ impl<T: Lane> CornerMotion<T> {
 }
 
 /// The computation of the motions of all forces with corners at a state.
-pub(super) struct CornerMotions<'a, T> {
+pub(super) struct CornerMotionEvaluation<'a, T> {
     pub(super) model: &'a Nonlinear<Dual<T>>,
     pub(super) spin: &'a SpinState<Dual<T>>,
     pub(super) x: &'a [N<T>; STATES],
 }
 
-impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
+impl<T: Lane> OutOfLine for CornerMotionEvaluation<'_, T> {
     type Output = Vec<CornerMotion<T>>;
 
     #[inline(always)]
@@ -70,14 +70,14 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
         for i in 0..STATES {
             state[i] = x[i].constant();
         }
-        let mut corners = vec![CornerMotion::zero(zero); model.corner_motions(&state).len()];
+        let mut corner_motions = vec![CornerMotion::zero(zero); model.corner_motions(&state).len()];
         for direction in 0..LOAD_RESPONSE_COORDINATES.len() {
             state[LOAD_RESPONSE_COORDINATES[direction]].0.slope = zero.lit(1.0).0;
             let motions = model.corner_motions(&state);
             let accelerations_per_load = model.accelerations_per_load(spin, &state);
             if direction < TUB_COORDINATES.len() {
-                for m in 0..corners.len() {
-                    corners[m].speed_per_coordinate[direction] = N(motions[m][1].0.slope);
+                for m in 0..corner_motions.len() {
+                    corner_motions[m].speed_per_coordinate[direction] = N(motions[m][1].0.slope);
                 }
             }
             // A force loads a coordinate by the derivative of the motion's speed by that
@@ -89,8 +89,8 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
                 }
                 unit_speed_state[COORDINATES + TUB_COORDINATES[k]] = zero.lit(1.0).constant();
                 let speeds = model.corner_motions(&unit_speed_state);
-                for m in 0..corners.len() {
-                    let corner = &mut corners[m];
+                for m in 0..corner_motions.len() {
+                    let corner = &mut corner_motions[m];
                     let speed = speeds[m][1];
                     corner.speed_per_tub_speed[k] = N(speed.0.value);
                     for i in 0..COORDINATES {
@@ -104,7 +104,7 @@ impl<T: Lane> OutOfLine for CornerMotions<'_, T> {
             }
             state[LOAD_RESPONSE_COORDINATES[direction]].0.slope = zero.0;
         }
-        corners
+        corner_motions
     }
 }
 

@@ -58,9 +58,9 @@ pub fn follow_crossings(
     step_s: f64,
     crossings: &[Crossing<'_>],
 ) -> Vec<Result<CrossingEffect, LeftRangeError>> {
-    let start = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
+    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
     let mut current_s = 0.0;
-    let mut state = start;
+    let mut state = rest_state;
     let mut failure = None;
     let mut effects = Vec::with_capacity(crossings.len());
     for crossing in crossings {
@@ -68,9 +68,9 @@ pub fn follow_crossings(
             if let Some(failure) = failure {
                 return Err(failure);
             }
-            let result = integrate(point, step_s, [current_s, to_s], &state);
+            let result = integrate_run(point, step_s, [current_s, to_s], &state);
             failure = result.failure;
-            (current_s, state) = (to_s, result.end);
+            (current_s, state) = (to_s, result.end_state);
             failure.map_or(Ok(state), Err)
         };
         let [from_s, to_s] = crossing.interval_s;
@@ -82,18 +82,21 @@ pub fn follow_crossings(
                 crossing,
                 entry_state: &entry_state,
             });
-            let norms = crossing.interval_s.map(|time_s| EnergyNorm::new(point, time_s));
-            let departure = |index: usize, state: &[f64; STATES]| {
+            let energy_norms = crossing.interval_s.map(|time_s| EnergyNorm::new(point, time_s));
+            let departure_energy_j = |index: usize, state: &[f64; STATES]| {
                 let response = crossing.responses[index]?;
                 let time_s = crossing.interval_s[index];
                 let response_state =
                     response_state_at(point, step_s, response, crossing.is_backward, time_s);
                 let difference = core::array::from_fn(|i| state[i] - response_state[i]);
-                Some(norms[index].energy_j(&difference))
+                Some(energy_norms[index].energy_j(&difference))
             };
             Ok(CrossingEffect {
-                amplification: amplification(&norms, &tangent_map),
-                departure_j: [departure(0, &entry_state), departure(1, &exit_state)],
+                amplification: amplification(&energy_norms, &tangent_map),
+                departure_j: [
+                    departure_energy_j(0, &entry_state),
+                    departure_energy_j(1, &exit_state),
+                ],
             })
         }));
     }
@@ -120,7 +123,7 @@ pub fn peaks_without_departures(
         // The run is divided at the ends of the window.
         for part_end_s in [window_s[0].min(to_s), window_s[1].min(to_s), to_s] {
             if part_end_s > time_s {
-                let result = integrate(point, step_s, [time_s, part_end_s], state);
+                let result = integrate_run(point, step_s, [time_s, part_end_s], state);
                 if let Some(failure) = result.failure {
                     return Err(failure);
                 }
@@ -129,7 +132,7 @@ pub fn peaks_without_departures(
                         *peak = peak.max(step_peak);
                     }
                 }
-                (time_s, *state) = (part_end_s, result.end);
+                (time_s, *state) = (part_end_s, result.end_state);
             }
         }
         Ok(())
@@ -150,16 +153,16 @@ pub fn peaks_without_departures(
 
 /// A sequence of equal steps within one spin segment.
 struct StepSequence {
-    spin: SpinSegment,
+    spin_segment: SpinSegment,
     start_s: f64,
     step_s: f64,
-    steps: usize,
+    step_count: usize,
 }
 
 impl StepSequence {
     /// Returns the time (s) after a number of steps.
-    fn time_s(&self, steps: f64) -> f64 {
-        self.start_s + self.step_s * steps
+    fn time_s(&self, step_count: f64) -> f64 {
+        self.start_s + self.step_s * step_count
     }
 
     /// Returns the forcing at the start, the middle and the end of step `k`.
@@ -173,8 +176,8 @@ impl StepSequence {
         let mut forcings = [system.forcing_out_of_line(zero.lit(self.time_s(k as f64))); 3];
         // This is a loop, because a closure would be compiled without the instruction set.
         for instant in 1..3 {
-            let steps = k as f64 + 0.5 * instant as f64;
-            forcings[instant] = system.forcing_out_of_line(zero.lit(self.time_s(steps)));
+            let step_count = k as f64 + 0.5 * instant as f64;
+            forcings[instant] = system.forcing_out_of_line(zero.lit(self.time_s(step_count)));
         }
         forcings
     }
@@ -182,17 +185,17 @@ impl StepSequence {
 
 /// Divides the time from `from_s` to `to_s` at the kinks of the spin.
 fn step_sequences(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<StepSequence> {
-    let kinks = point.spin_segments.iter().map(|spin_segment| spin_segment.start_s.0);
-    let inner_kinks = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
+    let kink_times_s = point.spin_segments.iter().map(|spin_segment| spin_segment.start_s.0);
+    let inner_kinks_s = kink_times_s.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
     let mut start_s = from_s;
     let mut sequences = Vec::new();
-    for end_s in inner_kinks.chain([to_s]) {
-        let steps = ((end_s - start_s) / step_s).ceil().max(1.0);
+    for end_s in inner_kinks_s.chain([to_s]) {
+        let step_count = ((end_s - start_s) / step_s).ceil().max(1.0);
         sequences.push(StepSequence {
-            spin: point.spin_segments[segment_index(&point.spin_segments, start_s)],
+            spin_segment: point.spin_segments[segment_index(&point.spin_segments, start_s)],
             start_s,
-            step_s: (end_s - start_s) / steps,
-            steps: steps as usize,
+            step_s: (end_s - start_s) / step_count,
+            step_count: step_count as usize,
         });
         start_s = end_s;
     }
@@ -201,21 +204,26 @@ fn step_sequences(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<S
 
 /// The result of a run over an interval of time.
 struct RunResult {
-    end: [f64; STATES],
+    end_state: [f64; STATES],
     /// The largest deviations of the channels at the ends of steps.
     peaks: [f64; CHANNELS],
     failure: Option<LeftRangeError>,
 }
 
-fn integrate(point: &Point, step_s: f64, interval_s: [f64; 2], start: &[f64; STATES]) -> RunResult {
+fn integrate_run(
+    point: &Point,
+    step_s: f64,
+    interval_s: [f64; 2],
+    start_state: &[f64; STATES],
+) -> RunResult {
     let sequences = step_sequences(point, step_s, interval_s);
-    Simd::one_lane(SequenceIntegration { point, sequences: &sequences, start })
+    Simd::one_lane(SequenceIntegration { point, sequences: &sequences, start_state })
 }
 
 struct SequenceIntegration<'a> {
     point: &'a Point,
     sequences: &'a [StepSequence],
-    start: &'a [f64; STATES],
+    start_state: &'a [f64; STATES],
 }
 
 impl OutOfLine for SequenceIntegration<'_> {
@@ -227,13 +235,13 @@ impl OutOfLine for SequenceIntegration<'_> {
         let mut model: Nonlinear<f64> = LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut x = [zero; STATES];
         for i in 0..STATES {
-            x[i] = N(self.start[i]);
+            x[i] = N(self.start_state[i]);
         }
         let mut peaks = [0.0_f64; CHANNELS];
         let mut failure = None;
         'run: for sequence in self.sequences {
-            model.set_spin(0, &sequence.spin);
-            for k in 0..sequence.steps {
+            model.set_spin(0, &sequence.spin_segment);
+            for k in 0..sequence.step_count {
                 let forcings = sequence.forcings(zero, &model, k);
                 integrate_step(&model, N(sequence.step_s), &forcings, &mut x);
                 if !model.in_range(&x) {
@@ -248,11 +256,11 @@ impl OutOfLine for SequenceIntegration<'_> {
                 }
             }
         }
-        let mut end = [0.0; STATES];
+        let mut end_state = [0.0; STATES];
         for i in 0..STATES {
-            end[i] = x[i].0;
+            end_state[i] = x[i].0;
         }
-        RunResult { end, peaks, failure }
+        RunResult { end_state, peaks, failure }
     }
 }
 
@@ -276,26 +284,26 @@ impl Kernel for TangentMap<'_> {
             LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut columns = Vec::with_capacity(STATES);
         while columns.len() < STATES {
-            let first = columns.len();
+            let first_column = columns.len();
             let mut x = [zero; STATES];
             for i in 0..STATES {
                 x[i] = zero.lit(self.entry_state[i]);
             }
             for lane in 0..T::LANES {
                 // Surplus lanes repeat the last column.
-                let column = (first + lane).min(STATES - 1);
+                let column = (first_column + lane).min(STATES - 1);
                 x[column].0.slope.set(lane, 1.0);
             }
             for sequence in &sequences {
                 for lane in 0..T::LANES {
-                    model.set_spin(lane, &sequence.spin);
+                    model.set_spin(lane, &sequence.spin_segment);
                 }
-                for k in 0..sequence.steps {
+                for k in 0..sequence.step_count {
                     let forcings = sequence.forcings(zero, &model, k);
                     integrate_step(&model, zero.lit(sequence.step_s), &forcings, &mut x);
                 }
             }
-            for lane in 0..T::LANES.min(STATES - first) {
+            for lane in 0..T::LANES.min(STATES - first_column) {
                 let mut column = [0.0; STATES];
                 for i in 0..STATES {
                     column[i] = x[i].0.slope.get(lane);
@@ -316,23 +324,24 @@ fn response_state_at(
     time_s: f64,
 ) -> [f64; STATES] {
     let speed_rad_per_s = response.speed_rpm * TAU / 60.0;
-    let (start, direction) = match is_backward {
-        true => (mirror_state(&response.start), -1.0),
-        false => (response.start, 1.0),
+    let (start_state, direction) = match is_backward {
+        true => (mirror_state(&response.start_state), -1.0),
+        false => (response.start_state, 1.0),
     };
-    let angle = (direction * theta_rad(point, time_s)).rem_euclid(TAU);
-    let end_s = angle / speed_rad_per_s;
+    let angle_rad = (direction * theta_rad(point, time_s)).rem_euclid(TAU);
+    let end_s = angle_rad / speed_rad_per_s;
     if end_s <= 0.0 {
-        return start;
+        return start_state;
     }
-    let steps = (end_s / step_s).ceil().max(1.0);
+    let step_count = (end_s / step_s).ceil().max(1.0);
     let sequence = StepSequence {
-        spin: SpinSegment::at_constant_speed(direction * response.speed_rpm),
+        spin_segment: SpinSegment::at_constant_speed(direction * response.speed_rpm),
         start_s: 0.0,
-        step_s: end_s / steps,
-        steps: steps as usize,
+        step_s: end_s / step_count,
+        step_count: step_count as usize,
     };
-    Simd::one_lane(SequenceIntegration { point, sequences: &[sequence], start: &start }).end
+    Simd::one_lane(SequenceIntegration { point, sequences: &[sequence], start_state: &start_state })
+        .end_state
 }
 
 /// Returns the drum's angle (rad) at a time, from -pi to pi.
@@ -352,11 +361,11 @@ impl EnergyNorm {
     fn new(point: &Point, time_s: f64) -> Self {
         let matrices = point.matrices(theta_rad(point, time_s), 0.0, 0.0);
         let doubled_energy_matrix = Mat::from_fn(STATES, STATES, |i, j| {
-            let block_i = i / COORDINATES;
-            let block_j = j / COORDINATES;
+            let block_row = i / COORDINATES;
+            let block_column = j / COORDINATES;
             let i = i % COORDINATES;
             let j = j % COORDINATES;
-            match (block_i, block_j) {
+            match (block_row, block_column) {
                 (0, 0) => 0.5 * (matrices.stiffness[i][j] + matrices.stiffness[j][i]),
                 (1, 1) => matrices.mass[i][j],
                 _ => 0.0,
@@ -370,9 +379,9 @@ impl EnergyNorm {
     /// Returns the energy (J) of a disturbance; NaN without a stable equilibrium.
     fn energy_j(&self, disturbance: &[f64; STATES]) -> f64 {
         let Some(cholesky_factor) = &self.cholesky_factor else { return f64::NAN };
-        let component =
+        let weighted_component =
             |j: usize| (j..STATES).map(|i| cholesky_factor[(i, j)] * disturbance[i]).sum::<f64>();
-        0.5 * (0..STATES).map(|j| component(j) * component(j)).sum::<f64>()
+        0.5 * (0..STATES).map(|j| weighted_component(j) * weighted_component(j)).sum::<f64>()
     }
 }
 

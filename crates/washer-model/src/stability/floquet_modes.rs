@@ -49,8 +49,9 @@ impl FloquetMode {
     /// Returns the damping ratio, relative to critical damping.
     #[must_use]
     pub fn damping_ratio(&self) -> f64 {
-        let squared = self.re_per_s * self.re_per_s + self.im_rad_per_s * self.im_rad_per_s;
-        -self.re_per_s / squared.sqrt()
+        let squared_magnitude =
+            self.re_per_s * self.re_per_s + self.im_rad_per_s * self.im_rad_per_s;
+        -self.re_per_s / squared_magnitude.sqrt()
     }
 }
 
@@ -64,12 +65,12 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
     let speed_rad_per_s = speed_rpm * TAU / 60.0;
     let highest_rad_per_s = highest_frequency_rad_per_s(point, speed_rad_per_s)
         .map_err(|_| ResponseError::NoEigenvalues)?;
-    let steps = (highest_rad_per_s * 60.0 / speed_rpm / STEP_PHASE_RAD).ceil().max(MIN_STEPS);
+    let step_count = (highest_rad_per_s * 60.0 / speed_rpm / STEP_PHASE_RAD).ceil().max(MIN_STEPS);
     let setup = TurnSetup {
         point,
         speed_rpm,
-        steps: steps as usize,
-        instants: INSTANTS_PER_TURN,
+        step_count: step_count as usize,
+        instant_count: INSTANTS_PER_TURN,
         caps: None,
         corner_width_m: 0.0,
     };
@@ -84,24 +85,24 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
     let mut similarities = Vec::with_capacity(STATES * COORDINATES);
     for eigenvalue_index in 0..STATES {
         let eigenvector = Mat::from_fn(STATES, 1, |i, _| eigenvectors[(i, eigenvalue_index)]);
-        let modal_energies = modal_energies(&frozen_modes, &eigenvector, unit_per_s);
-        let total: f64 = modal_energies.iter().map(|(_, energy)| energy).sum();
+        let mode_energies = modal_energies(&frozen_modes, &eigenvector, unit_per_s);
+        let total_energy: f64 = mode_energies.iter().map(|(_, energy)| energy).sum();
         if !(eigenvalues[eigenvalue_index].re.is_finite()
             && eigenvalues[eigenvalue_index].im.is_finite()
-            && total > 0.0)
+            && total_energy > 0.0)
         {
             return Err(ResponseError::NoEigenvalues);
         }
         similarities.extend(
-            modal_energies
+            mode_energies
                 .into_iter()
-                .map(|(mode, energy)| (energy / total, mode, eigenvalue_index)),
+                .map(|(mode, energy)| (energy / total_energy, mode, eigenvalue_index)),
         );
     }
     similarities.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     // A conjugate pair of eigenvalues belongs to one mode; the most similar pairs of mode and
     // eigenvalue are assigned first.
-    let mut floquet_modes = Vec::with_capacity(COORDINATES);
+    let mut sorted_modes = Vec::with_capacity(COORDINATES);
     let mut has_eigenvalue = [false; COORDINATES];
     let mut is_assigned = [false; STATES];
     for (_, mode, eigenvalue_index) in similarities {
@@ -110,21 +111,21 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
         }
         let mu = eigenvalues[eigenvalue_index];
         let is_conjugate = |other: c64| (other - mu.conj()).norm() <= 1e-9 * mu.norm();
-        let conjugate = (0..STATES).find(|&other| {
+        let conjugate_index = (0..STATES).find(|&other| {
             other != eigenvalue_index && !is_assigned[other] && is_conjugate(eigenvalues[other])
         });
         is_assigned[eigenvalue_index] = true;
-        if let Some(conjugate) = conjugate {
-            is_assigned[conjugate] = true;
+        if let Some(conjugate_index) = conjugate_index {
+            is_assigned[conjugate_index] = true;
         }
         has_eigenvalue[mode] = true;
         if mu.norm_sqr() > MIN_MULTIPLIER * MIN_MULTIPLIER {
-            floquet_modes.push(nearest_floquet_mode(&frozen_modes.modes[mode], mu, speed_rpm));
+            sorted_modes.push(nearest_floquet_mode(&frozen_modes.modes[mode], mu, speed_rpm));
         }
     }
-    let frequency = |mode: &FloquetMode| mode.frozen_mode.magnitude_rad_per_s;
-    floquet_modes.sort_by(|a, b| frequency(a).total_cmp(&frequency(b)));
-    Ok(floquet_modes)
+    let frozen_frequency = |mode: &FloquetMode| mode.frozen_mode.magnitude_rad_per_s;
+    sorted_modes.sort_by(|a, b| frozen_frequency(a).total_cmp(&frozen_frequency(b)));
+    Ok(sorted_modes)
 }
 
 /// Returns the Floquet mode of a multiplier, with the exponent nearest to that of a frozen mode.
@@ -133,15 +134,18 @@ fn nearest_floquet_mode(frozen_mode: &Mode, mu: c64, speed_rpm: f64) -> FloquetM
     let im = round_last_digits(mu.im);
     let speed_rad_per_s = speed_rpm * TAU / 60.0;
     let re_per_s = super::growth_per_s([re, im], speed_rpm);
-    let turns = libm::atan2(im, re) / TAU;
-    let nearest_rad_per_s = |turns: f64| {
-        let whole_turns = (frozen_mode.im_rad_per_s / speed_rad_per_s - turns).round_ties_even();
-        (turns + whole_turns) * speed_rad_per_s
+    let argument_turns = libm::atan2(im, re) / TAU;
+    let nearest_rad_per_s = |argument_turns: f64| {
+        let whole_turns =
+            (frozen_mode.im_rad_per_s / speed_rad_per_s - argument_turns).round_ties_even();
+        (argument_turns + whole_turns) * speed_rad_per_s
     };
     // The conjugate multiplier belongs to the same mode.
-    let [from_multiplier, from_conjugate] = [nearest_rad_per_s(turns), nearest_rad_per_s(-turns)];
-    let distance = |im: f64| (im - frozen_mode.im_rad_per_s).abs();
-    let im_rad_per_s = if distance(from_multiplier) <= distance(from_conjugate) {
+    let [from_multiplier, from_conjugate] =
+        [nearest_rad_per_s(argument_turns), nearest_rad_per_s(-argument_turns)];
+    let frequency_distance = |im: f64| (im - frozen_mode.im_rad_per_s).abs();
+    let im_rad_per_s = if frequency_distance(from_multiplier) <= frequency_distance(from_conjugate)
+    {
         from_multiplier
     } else {
         from_conjugate
@@ -164,7 +168,7 @@ impl Kernel for LinearMonodromy<'_> {
         let model: Linear<T> = lane_model(zero, &[setup]);
         let grid = StepGrid {
             step_s: zero.lit(setup.step_s()),
-            steps: setup.steps,
+            step_count: setup.step_count,
             hinge_damping_factor: None,
         };
         let mut lane_groups = vec![[zero; STATES]; 1 + STATES.div_ceil(T::LANES)];
@@ -175,8 +179,8 @@ impl Kernel for LinearMonodromy<'_> {
         let mut matrix = [[N(0.0); STATES]; STATES];
         for i in 0..STATES {
             for j in 0..STATES {
-                let response = lane_groups[1 + j / T::LANES][i] - lane_groups[0][i];
-                matrix[i][j] = N(response.0.get(j % T::LANES));
+                let end_difference = lane_groups[1 + j / T::LANES][i] - lane_groups[0][i];
+                matrix[i][j] = N(end_difference.0.get(j % T::LANES));
             }
         }
         matrix

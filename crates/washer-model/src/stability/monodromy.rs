@@ -7,7 +7,7 @@
 //! Lanes hold instants of a turn while derivatives are computed, and disturbances while these are
 //! integrated.
 
-use super::corners::{AccelerationDerivatives, CornerMotion, CornerMotions};
+use super::corners::{AccelerationDerivatives, CornerMotion, CornerMotionEvaluation};
 use super::turn::{A, B, StepGrid};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
@@ -29,8 +29,8 @@ pub(crate) type StateMatrix = [[N<f64>; STATES]; STATES];
 
 /// Converts a matrix of derivatives to speeds in a unit (1/s).
 pub(crate) fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
-    let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
-    Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
+    let component_unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
+    Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * component_unit(j) / component_unit(i))
 }
 
 /// The number of vector registers' worth of disturbances that are integrated through a step at
@@ -60,9 +60,9 @@ pub(super) struct SmoothMonodromy<'a, T> {
     pub(super) grid: StepGrid<T>,
     pub(super) turn_count: usize,
     /// The number of equally spaced instants of a turn at which derivatives are computed.
-    pub(super) instants: usize,
+    pub(super) instant_count: usize,
     /// The states at equally spaced instants, a lane for each turn. Their number is a multiple of
-    /// `instants`.
+    /// `instant_count`.
     pub(super) states: &'a [[N<T>; STATES]],
     /// The forces with corners in the turns' lanes, at the start, middle and end of all steps.
     pub(super) corner_forces: &'a [CornerForce<T>],
@@ -74,12 +74,13 @@ struct SmoothCoefficients {
     /// The derivatives of the accelerations without those of forces with corners.
     derivatives: AccelerationDerivatives,
     /// The motions on which the forces with corners depend.
-    corners: Vec<CornerMotion<f64>>,
+    corner_motions: Vec<CornerMotion<f64>>,
 }
 
 impl SmoothCoefficients {
     /// Coefficients that are all zero.
-    const ZERO: Self = Self { derivatives: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
+    const ZERO: Self =
+        Self { derivatives: [[N(0.0); STATES]; COORDINATES], corner_motions: Vec::new() };
 }
 
 /// The weights of the samples in a sum.
@@ -115,13 +116,13 @@ fn compute_weighted_sums(
         }
     }
     for (index, weights) in weights.iter().enumerate() {
-        sums[index].corners.clear();
-        for m in 0..samples[0].corners.len() {
+        sums[index].corner_motions.clear();
+        for m in 0..samples[0].corner_motions.len() {
             let mut corner = CornerMotion::zero(N(0.0));
             for k in 0..samples.len() {
-                corner.add_scaled(&samples[k].corners[m], weights[k]);
+                corner.add_scaled(&samples[k].corner_motions[m], weights[k]);
             }
-            sums[index].corners.push(corner);
+            sums[index].corner_motions.push(corner);
         }
     }
 }
@@ -135,16 +136,16 @@ fn compute_weighted_accelerations<const SUMS: usize>(
     weights: &[SampleWeights; SUMS],
     sums: &mut [SmoothCoefficients; SUMS],
 ) {
-    let mut sum = [[N(0.0); STATES]; SUMS];
+    let mut row_sums_of_samples = [[N(0.0); STATES]; SUMS];
     for k in 0..samples.len() {
         for index in 0..SUMS {
             for j in 0..STATES {
-                sum[index][j] += samples[k].derivatives[i][j] * weights[index][k];
+                row_sums_of_samples[index][j] += samples[k].derivatives[i][j] * weights[index][k];
             }
         }
     }
     for index in 0..SUMS {
-        sums[index].derivatives[i] = sum[index];
+        sums[index].derivatives[i] = row_sums_of_samples[index];
     }
 }
 
@@ -158,8 +159,8 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
         let samples = self.sample_coefficients(zero);
         let vectors_per_block =
             if T::LANES == MAX_LANES { WIDE_VECTORS_PER_BLOCK } else { VECTORS_PER_BLOCK };
-        let vectors = STATES.div_ceil(vectors_per_block * T::LANES) * vectors_per_block;
-        let mut columns = vec![vec![[zero; STATES]; vectors]; self.turn_count];
+        let vector_count = STATES.div_ceil(vectors_per_block * T::LANES) * vectors_per_block;
+        let mut columns = vec![vec![[zero; STATES]; vector_count]; self.turn_count];
         for columns in &mut columns {
             for j in 0..STATES {
                 columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
@@ -173,7 +174,7 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
             let lagrange_weights = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
             parabola_weights[k][..lagrange_weights.len()].copy_from_slice(&lagrange_weights);
         }
-        for first_step in (0..self.grid.steps).step_by(STEPS_AT_ONCE) {
+        for first_step in (0..self.grid.step_count).step_by(STEPS_AT_ONCE) {
             for (turn, columns) in columns.iter_mut().enumerate() {
                 if self.corner_forces.is_empty() {
                     interpolate(&samples[turn], weights, 2 * first_step, &mut coefficients);
@@ -195,10 +196,15 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                 }
                 let step_s = zero.lit(self.grid.step_s.0.get(turn));
                 for k in 0..STEPS_AT_ONCE {
-                    let start = &coefficients[2 * k].derivatives;
-                    let middle = &coefficients[2 * k + 1].derivatives;
-                    let end = &coefficients[2 * k + 2].derivatives;
-                    let coefficients = [start, middle, middle, end];
+                    let start_derivatives = &coefficients[2 * k].derivatives;
+                    let middle_derivatives = &coefficients[2 * k + 1].derivatives;
+                    let end_derivatives = &coefficients[2 * k + 2].derivatives;
+                    let coefficients = [
+                        start_derivatives,
+                        middle_derivatives,
+                        middle_derivatives,
+                        end_derivatives,
+                    ];
                     if T::LANES == MAX_LANES {
                         for disturbances in columns.as_chunks_mut::<WIDE_VECTORS_PER_BLOCK>().0 {
                             integrate_step(zero, step_s, coefficients, disturbances);
@@ -211,15 +217,15 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                 }
             }
         }
-        let mut matrices = vec![[[N(0.0); STATES]; STATES]; self.turn_count];
-        for (matrix, columns) in matrices.iter_mut().zip(&columns) {
+        let mut monodromy_matrices = vec![[[N(0.0); STATES]; STATES]; self.turn_count];
+        for (matrix, columns) in monodromy_matrices.iter_mut().zip(&columns) {
             for i in 0..STATES {
                 for j in 0..STATES {
                     matrix[i][j] = N(columns[j / T::LANES][i].0.get(j % T::LANES));
                 }
             }
         }
-        matrices
+        monodromy_matrices
     }
 }
 
@@ -228,31 +234,35 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
     #[inline(always)]
     fn sample_coefficients(&self, zero: N<T>) -> Vec<Vec<SmoothCoefficients>> {
         let instants_at_once = T::LANES / self.turn_count;
-        let last_instant = self.instants - 1;
-        let state_stride = self.states.len() / self.instants;
-        let steps_per_instant = self.grid.steps / self.instants;
-        let mut samples = vec![vec![SmoothCoefficients::ZERO; self.instants]; self.turn_count];
-        let mut instants = [0; MAX_LANES];
+        let last_instant = self.instant_count - 1;
+        let state_stride = self.states.len() / self.instant_count;
+        let steps_per_instant = self.grid.step_count / self.instant_count;
+        let mut samples = vec![vec![SmoothCoefficients::ZERO; self.instant_count]; self.turn_count];
+        let mut lane_instants = [0; MAX_LANES];
         let mut derivatives = [[zero; STATES]; COORDINATES];
-        for instant in (0..self.instants).step_by(instants_at_once) {
-            let mut step = zero;
+        for instant in (0..self.instant_count).step_by(instants_at_once) {
+            let mut step_index = zero;
             let mut state = [zero; STATES];
             for lane in 0..T::LANES {
-                instants[lane] = (instant + (lane / self.turn_count).min(instants_at_once - 1))
-                    .min(last_instant);
-                step.0.set(lane, (instants[lane] * steps_per_instant) as f64);
+                lane_instants[lane] = (instant
+                    + (lane / self.turn_count).min(instants_at_once - 1))
+                .min(last_instant);
+                step_index.0.set(lane, (lane_instants[lane] * steps_per_instant) as f64);
                 for i in 0..STATES {
                     state[i].0.set(
                         lane,
-                        self.states[instants[lane] * state_stride][i].0.get(lane % self.turn_count),
+                        self.states[lane_instants[lane] * state_stride][i]
+                            .0
+                            .get(lane % self.turn_count),
                     );
                 }
             }
-            let spin = self.model.forcing_out_of_line((self.grid.step_s * step).v().constant());
-            self.derivatives(zero, &spin, &state, &mut derivatives);
-            let mut corners = Vec::new();
+            let spin =
+                self.model.forcing_out_of_line((self.grid.step_s * step_index).v().constant());
+            self.compute_derivatives(zero, &spin, &state, &mut derivatives);
+            let mut corner_motions = Vec::new();
             if !self.corner_forces.is_empty() {
-                corners = zero.0.run_out_of_line(CornerMotions {
+                corner_motions = zero.0.run_out_of_line(CornerMotionEvaluation {
                     model: &self.model,
                     spin: &spin,
                     x: &state,
@@ -260,16 +270,17 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
             }
             for lane in 0..T::LANES {
                 let turn = lane % self.turn_count;
-                let coefficients = &mut samples[turn][instants[lane]];
+                let coefficients = &mut samples[turn][lane_instants[lane]];
                 for i in 0..COORDINATES {
                     for j in 0..STATES {
                         coefficients.derivatives[i][j] = N(derivatives[i][j].0.get(lane));
                     }
                 }
-                coefficients.corners = corners.iter().map(|corner| corner.get_lane(lane)).collect();
+                coefficients.corner_motions =
+                    corner_motions.iter().map(|corner| corner.get_lane(lane)).collect();
                 self.add_corner_derivatives(
                     turn,
-                    2 * instants[lane] * steps_per_instant,
+                    2 * lane_instants[lane] * steps_per_instant,
                     -1.0,
                     coefficients,
                 );
@@ -287,10 +298,10 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
         sign: f64,
         coefficients: &mut SmoothCoefficients,
     ) {
-        let corner_count = coefficients.corners.len();
+        let corner_count = coefficients.corner_motions.len();
         for m in 0..corner_count {
             let force = self.corner_forces[instant * corner_count + m].get_lane(turn);
-            coefficients.corners[m].add_force_derivatives(
+            coefficients.corner_motions[m].add_force_derivatives(
                 &force,
                 sign,
                 &mut coefficients.derivatives,
@@ -300,7 +311,7 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
 
     /// Computes the derivatives of the accelerations at a state.
     #[inline(always)]
-    fn derivatives(
+    fn compute_derivatives(
         &self,
         zero: N<T>,
         forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
@@ -326,20 +337,21 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
 /// values. There is a list of weights for the start and the middle of each step between the first
 /// and the second instant.
 #[inline(always)]
-pub(super) fn interpolation_weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
-    let subdivisions = 2 * steps / instants;
-    let mut weights = vec![vec![0.0; instants]; subdivisions];
+pub(super) fn interpolation_weights(step_count: usize, instant_count: usize) -> Vec<Vec<f64>> {
+    let subdivisions = 2 * step_count / instant_count;
+    let mut weights = vec![vec![0.0; instant_count]; subdivisions];
     // This is a loop, because a closure would be compiled without the instruction set.
     for subdivision in 0..subdivisions {
-        for instant in 0..instants {
+        for instant in 0..instant_count {
             let turns =
-                (subdivision as f64 / subdivisions as f64 - instant as f64) / instants as f64;
-            let mut harmonics = 0.0;
-            for harmonic in 1..instants / 2 {
-                harmonics += 2.0 * trig::sin_cos_turns(N(harmonic as f64 * turns)).1.0;
+                (subdivision as f64 / subdivisions as f64 - instant as f64) / instant_count as f64;
+            let mut harmonic_sum = 0.0;
+            for harmonic in 1..instant_count / 2 {
+                harmonic_sum += 2.0 * trig::sin_cos_turns(N(harmonic as f64 * turns)).1.0;
             }
-            let (_, last_cosine) = trig::sin_cos_turns(N((instants / 2) as f64 * turns));
-            weights[subdivision][instant] = (1.0 + harmonics + last_cosine.0) / instants as f64;
+            let (_, last_cosine) = trig::sin_cos_turns(N((instant_count / 2) as f64 * turns));
+            weights[subdivision][instant] =
+                (1.0 + harmonic_sum + last_cosine.0) / instant_count as f64;
         }
     }
     weights
@@ -356,11 +368,11 @@ fn interpolate(
 ) {
     let mut weights_by_sample = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_AT_ONCE];
     let weights_by_sample = &mut weights_by_sample[..coefficients.len()];
-    let stride = (INSTANTS_AT_ONCE - 1) / (coefficients.len() - 1);
+    let instant_stride = (INSTANTS_AT_ONCE - 1) / (coefficients.len() - 1);
     for (k, weights_by_sample) in weights_by_sample.iter_mut().enumerate() {
-        let position = first_instant + k * stride;
-        let first_sample = position / weights.len();
-        let subdivision = position % weights.len();
+        let instant_index = first_instant + k * instant_stride;
+        let first_sample = instant_index / weights.len();
+        let subdivision = instant_index % weights.len();
         for (instant, weight) in weights[subdivision].iter().enumerate() {
             weights_by_sample[(first_sample + instant) % samples.len()] = *weight;
         }
@@ -421,15 +433,20 @@ mod tests {
 
     #[test]
     fn interpolation_reproduces_a_trigonometric_polynomial() {
-        let wave = |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
+        let wave_value =
+            |turns: f64| 0.3 + (TAU * turns).sin() - 0.5 * (7.0 * TAU * turns + 0.2).cos();
         let values: [f64; INSTANTS_PER_TURN] =
-            from_fn(|k| wave(k as f64 / INSTANTS_PER_TURN as f64));
+            from_fn(|k| wave_value(k as f64 / INSTANTS_PER_TURN as f64));
         for (subdivision, weights) in
             interpolation_weights(5 * INSTANTS_PER_TURN / 2, INSTANTS_PER_TURN).iter().enumerate()
         {
-            let sum: f64 = weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
+            let interpolated_value: f64 =
+                weights.iter().zip(values).map(|(weight, value)| weight * value).sum();
             let turns = subdivision as f64 / 5.0 / INSTANTS_PER_TURN as f64;
-            assert!((sum - wave(turns)).abs() < 1e-14, "{subdivision}: {sum}");
+            assert!(
+                (interpolated_value - wave_value(turns)).abs() < 1e-14,
+                "{subdivision}: {interpolated_value}"
+            );
         }
     }
 }

@@ -83,19 +83,19 @@ const MAX_FINAL_DEFLATION: f64 = 1e-3;
 pub(crate) fn relative_residual(
     point: &Point,
     speed_rpm: f64,
-    start: &[f64; STATES],
-    end: &[f64; STATES],
+    start_state: &[f64; STATES],
+    end_state: &[f64; STATES],
 ) -> f64 {
     let equilibrium = point.equilibrium();
     let speed_rad_per_s = speed_rpm * TAU / 60.0;
     let mut residual = 0.0_f64;
     let mut largest_deviation = MIN_DEVIATION;
     for i in 0..COORDINATES {
-        largest_deviation = largest_deviation.max((start[i] - equilibrium[i]).abs());
-        let speed_gap = end[COORDINATES + i] - start[COORDINATES + i];
-        let gap = (end[i] - start[i]).abs() + speed_gap.abs() / speed_rad_per_s;
+        largest_deviation = largest_deviation.max((start_state[i] - equilibrium[i]).abs());
+        let speed_defect = end_state[COORDINATES + i] - start_state[COORDINATES + i];
+        let defect = (end_state[i] - start_state[i]).abs() + speed_defect.abs() / speed_rad_per_s;
         // A residual of NaN is kept.
-        residual = if gap > residual || gap.is_nan() { gap } else { residual };
+        residual = if defect > residual || defect.is_nan() { defect } else { residual };
     }
     residual / largest_deviation
 }
@@ -103,11 +103,11 @@ pub(crate) fn relative_residual(
 /// Factors 1 - Phi, the matrix of Newton's equations for a fixed point of the period map, from the
 /// monodromy matrix Phi. Returns `None` if it is singular.
 pub(super) fn factor_fixed_point_equations(monodromy: &StateMatrix) -> Option<Lu<STATES>> {
-    let mut equations = monodromy.map(|row| row.map(|entry| -entry));
+    let mut equation_matrix = monodromy.map(|row| row.map(|entry| -entry));
     for i in 0..STATES {
-        equations[i][i] = equations[i][i] + 1.0;
+        equation_matrix[i][i] = equation_matrix[i][i] + 1.0;
     }
-    factor_matrix(&equations)
+    factor_matrix(&equation_matrix)
 }
 
 /// Factors a matrix; returns `None` if it is singular.
@@ -138,7 +138,7 @@ pub(super) struct NewtonSearch<'a> {
     /// The number of remaining turns of the transient before the first correction.
     transient_turns: usize,
     /// The largest correction of a coordinate (m, rad).
-    max_step: f64,
+    max_newton_step: f64,
     /// The known responses, which the search is not to find again.
     known_responses: Vec<[f64; STATES]>,
     residual: f64,
@@ -161,7 +161,7 @@ impl<'a> NewtonSearch<'a> {
             factors,
             turn_count: 0,
             transient_turns: 0,
-            max_step: f64::INFINITY,
+            max_newton_step: f64::INFINITY,
             known_responses: Vec::new(),
             residual: f64::INFINITY,
             is_last_turn: false,
@@ -171,9 +171,13 @@ impl<'a> NewtonSearch<'a> {
     }
 
     /// Creates a search by damped Newton steps, none of which changes a coordinate by more than
-    /// `max_step` (m, rad). Such a search stays near its start if another response is close.
-    pub(super) fn new_damped(setup: TurnSetup<'a>, state: [f64; STATES], max_step: f64) -> Self {
-        Self { max_step, ..Self::new(setup, state, None) }
+    /// `max_newton_step` (m, rad). Such a search stays near its start if another response is close.
+    pub(super) fn new_damped(
+        setup: TurnSetup<'a>,
+        state: [f64; STATES],
+        max_newton_step: f64,
+    ) -> Self {
+        Self { max_newton_step, ..Self::new(setup, state, None) }
     }
 
     /// Creates a damped search by deflated Newton steps (Farrell, Birkisson and Funke 2015): known
@@ -181,10 +185,10 @@ impl<'a> NewtonSearch<'a> {
     pub(super) fn new_deflated(
         setup: TurnSetup<'a>,
         state: [f64; STATES],
-        max_step: f64,
+        max_newton_step: f64,
         known_responses: Vec<[f64; STATES]>,
     ) -> Self {
-        Self { known_responses, ..Self::new_damped(setup, state, max_step) }
+        Self { known_responses, ..Self::new_damped(setup, state, max_newton_step) }
     }
 
     /// Returns the factor by which deflation multiplies a Newton step: with the residual multiplied
@@ -192,21 +196,21 @@ impl<'a> NewtonSearch<'a> {
     /// ln m), where d ln m is the derivative of ln m along d.
     fn deflation_factor(&self, step: &[N<f64>; STATES]) -> f64 {
         let speed_rad_per_s = self.setup.speed_rpm * TAU / 60.0;
-        let unit = |i: usize| {
+        let repulsion_unit = |i: usize| {
             if i < COORDINATES { REPULSION_RANGE } else { REPULSION_RANGE * speed_rad_per_s }
         };
-        let mut derivative = 0.0;
+        let mut log_derivative = 0.0;
         for known_response in &self.known_responses {
             let mut squared_distance = 0.0;
             let mut scalar_product = 0.0;
             for i in 0..STATES {
-                let offset = (self.state[i] - known_response[i]) / unit(i);
-                squared_distance += offset * offset;
-                scalar_product += offset * step[i].0 / unit(i);
+                let relative_offset = (self.state[i] - known_response[i]) / repulsion_unit(i);
+                squared_distance += relative_offset * relative_offset;
+                scalar_product += relative_offset * step[i].0 / repulsion_unit(i);
             }
-            derivative -= 2.0 * scalar_product / (squared_distance * (1.0 + squared_distance));
+            log_derivative -= 2.0 * scalar_product / (squared_distance * (1.0 + squared_distance));
         }
-        1.0 / (1.0 - derivative)
+        1.0 / (1.0 - log_derivative)
     }
 
     /// Creates a search that integrates the transient over a number of turns before Newton's
@@ -237,30 +241,35 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
             return Vec::new();
         }
         if self.transient_turns > 0 {
-            return vec![TurnRequest { setup: self.setup, start: self.state, is_recorded: false }];
+            return vec![TurnRequest {
+                setup: self.setup,
+                start_state: self.state,
+                is_recorded: false,
+            }];
         }
         let is_recorded = self.is_last_turn || self.factors.is_none();
         let mut setup = self.setup;
-        let uses_all_instants = self.is_last_turn || self.max_step.is_finite();
+        let uses_all_instants = self.is_last_turn || self.max_newton_step.is_finite();
         if !(uses_all_instants || setup.differentiates_steps()) {
             // Derivatives at half the instants reduce the residual to some 1e-7 of its value, which
             // is enough before the last turn. If motions have many harmonics, the iteration may
             // oscillate about a response, so that a damped search uses all instants.
-            setup.instants /= 2;
+            setup.instant_count /= 2;
         }
-        vec![TurnRequest { setup, start: self.state, is_recorded }]
+        vec![TurnRequest { setup, start_state: self.state, is_recorded }]
     }
 
     fn receive_results(&mut self, results: Vec<TurnResult>) {
-        let Some(TurnResult { end, record }) = results.into_iter().next() else { return };
+        let Some(TurnResult { end_state, record }) = results.into_iter().next() else { return };
         if self.transient_turns > 0 {
             self.transient_turns -= 1;
-            self.state = end;
-            self.is_over = end.iter().any(|x| !x.is_finite());
+            self.state = end_state;
+            self.is_over = end_state.iter().any(|x| !x.is_finite());
             return;
         }
         self.turn_count += 1;
-        let residual = relative_residual(self.setup.point, self.setup.speed_rpm, &self.state, &end);
+        let residual =
+            relative_residual(self.setup.point, self.setup.speed_rpm, &self.state, &end_state);
         if self.is_last_turn && residual < RESPONSE_TOLERANCE {
             self.is_over = true;
             self.record = record;
@@ -278,13 +287,13 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
         }
         self.is_over |= !residual.is_finite() || self.turn_count == MAX_TURNS;
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
-            let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
-            let correction = factors.solve(&gap);
+            let defect = core::array::from_fn(|i| N(end_state[i] - self.state[i]));
+            let correction = factors.solve(&defect);
             let max_correction =
                 correction[..COORDINATES].iter().map(|change| change.0.abs()).fold(0.0, f64::max);
             let deflation_ratio = self.deflation_factor(&correction);
             let step_factor = deflation_ratio
-                * (self.max_step / (deflation_ratio.abs() * max_correction)).min(1.0);
+                * (self.max_newton_step / (deflation_ratio.abs() * max_correction)).min(1.0);
             for i in 0..STATES {
                 self.state[i] += step_factor * correction[i].0;
             }

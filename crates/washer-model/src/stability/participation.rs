@@ -29,31 +29,31 @@ const RELATIVE_SHIFT: f64 = 1e-9;
 /// shares are not finite for a disturbance of zero.
 pub(super) fn energy_shares(
     frozen_modes: &Modes,
-    vector: &Mat<c64>,
+    disturbance: &Mat<c64>,
     unit_per_s: f64,
 ) -> Vec<(usize, f64)> {
-    let mut energy_shares = modal_energies(frozen_modes, vector, unit_per_s);
-    let total: f64 = energy_shares.iter().map(|(_, energy)| energy).sum();
-    energy_shares.iter_mut().for_each(|(_, energy)| *energy /= total);
-    energy_shares
+    let mut mode_shares = modal_energies(frozen_modes, disturbance, unit_per_s);
+    let total_energy: f64 = mode_shares.iter().map(|(_, energy)| energy).sum();
+    mode_shares.iter_mut().for_each(|(_, energy)| *energy /= total_energy);
+    mode_shares
 }
 
 /// Returns the one or two modes with most of a disturbance's energy.
 pub(super) fn participating_modes(
     point: &Point,
     frozen_modes: &Modes,
-    vector: &Mat<c64>,
+    disturbance: &Mat<c64>,
     unit_per_s: f64,
 ) -> Vec<ParticipatingMode> {
-    let mut energy_shares = energy_shares(frozen_modes, vector, unit_per_s);
-    energy_shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let mut mode_shares = energy_shares(frozen_modes, disturbance, unit_per_s);
+    mode_shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let mut named_modes = Vec::with_capacity(MAX_NAMED_MODES);
-    let mut named_share = 0.0;
-    for (mode_index, share) in energy_shares.into_iter().take(MAX_NAMED_MODES) {
-        if named_share >= NAMED_ENERGY_SHARE {
+    let mut named_energy_share = 0.0;
+    for (mode_index, share) in mode_shares.into_iter().take(MAX_NAMED_MODES) {
+        if named_energy_share >= NAMED_ENERGY_SHARE {
             break;
         }
-        named_share += share;
+        named_energy_share += share;
         let mode = &frozen_modes.modes[mode_index];
         named_modes.push(ParticipatingMode {
             mode: mode_index + 1,
@@ -68,25 +68,25 @@ pub(super) fn participating_modes(
 /// Returns the eigenvector of a multiplier, by inverse iteration.
 pub(super) fn eigenvector(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
     let shift = multiplier * (1.0 + RELATIVE_SHIFT);
-    let shifted = Mat::from_fn(STATES, STATES, |i, j| {
+    let shifted_matrix = Mat::from_fn(STATES, STATES, |i, j| {
         let entry = c64::new(monodromy[(i, j)], 0.0);
         if i == j { entry - shift } else { entry }
     });
-    let factors = shifted.partial_piv_lu();
-    let mut vector = Mat::from_fn(STATES, 1, |_, _| c64::new(1.0, 0.0));
+    let factors = shifted_matrix.partial_piv_lu();
+    let mut iterate = Mat::from_fn(STATES, 1, |_, _| c64::new(1.0, 0.0));
     for _ in 0..INVERSE_ITERATIONS {
-        vector = factors.solve(vector);
-        let norm = (0..STATES).map(|i| vector[(i, 0)].norm_sqr()).sum::<f64>().sqrt();
-        vector = Mat::from_fn(STATES, 1, |i, _| vector[(i, 0)] / norm);
+        iterate = factors.solve(iterate);
+        let norm = (0..STATES).map(|i| iterate[(i, 0)].norm_sqr()).sum::<f64>().sqrt();
+        iterate = Mat::from_fn(STATES, 1, |i, _| iterate[(i, 0)] / norm);
     }
-    vector
+    iterate
 }
 
 /// Returns the index of every mode and the mode's part of a disturbance's energy: the squares of
 /// the modal coordinates, weighted by the energy of a unit coordinate.
 pub(super) fn modal_energies(
     frozen_modes: &Modes,
-    vector: &Mat<c64>,
+    disturbance: &Mat<c64>,
     unit_per_s: f64,
 ) -> Vec<(usize, f64)> {
     // The right eigenvectors, two for each mode: those of the conjugate pair, or for an overdamped
@@ -105,16 +105,18 @@ pub(super) fn modal_energies(
         let s = c64::new(mode.re_per_s, sign * mode.im_rad_per_s);
         if is_speed { entry * s / unit_per_s } else { entry }
     });
-    let coordinates = eigenvectors.partial_piv_lu().solve(vector);
-    let energy = |mode_index: usize| {
+    let modal_coordinates = eigenvectors.partial_piv_lu().solve(disturbance);
+    let mode_energy = |mode_index: usize| {
         let mode = &frozen_modes.modes[mode_index];
-        let squares = [2 * mode_index, 2 * mode_index + 1].map(|i| coordinates[(i, 0)].norm_sqr());
-        let stiffness = mode.magnitude_rad_per_s * mode.magnitude_rad_per_s;
+        let squared_coordinates =
+            [2 * mode_index, 2 * mode_index + 1].map(|i| modal_coordinates[(i, 0)].norm_sqr());
+        let modal_stiffness = mode.magnitude_rad_per_s * mode.magnitude_rad_per_s;
         if mode.im_rad_per_s == 0.0 {
-            stiffness * squares[0] + unit_per_s * unit_per_s * squares[1]
+            modal_stiffness * squared_coordinates[0]
+                + unit_per_s * unit_per_s * squared_coordinates[1]
         } else {
-            stiffness * (squares[0] + squares[1])
+            modal_stiffness * (squared_coordinates[0] + squared_coordinates[1])
         }
     };
-    (0..COORDINATES).map(|mode_index| (mode_index, energy(mode_index))).collect()
+    (0..COORDINATES).map(|mode_index| (mode_index, mode_energy(mode_index))).collect()
 }

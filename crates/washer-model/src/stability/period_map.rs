@@ -40,10 +40,10 @@ pub(crate) struct TurnSetup<'a> {
     pub(crate) point: &'a Point,
     pub(crate) speed_rpm: f64,
     /// The number of integration steps of a turn.
-    pub(crate) steps: usize,
+    pub(crate) step_count: usize,
     /// The number of equally spaced instants of a turn at which partial derivatives are computed.
     /// If it equals the number of steps, the steps themselves are differentiated.
-    pub(crate) instants: usize,
+    pub(crate) instant_count: usize,
     /// The caps of the modes of bearings and hinge; `None` if the steps resolve these modes.
     pub(crate) caps: Option<Caps>,
     /// The least width (m) of the corners of stops and free strokes; 0 leaves them as they are.
@@ -58,7 +58,7 @@ impl TurnSetup<'_> {
     /// Returns the set-up at a nearby speed, with the same number of steps, caps that change in
     /// proportion to the speed, and corners that change in proportion to the step.
     pub(super) fn at_nearby_speed(self, speed_rpm: f64) -> Self {
-        let caps = self.caps.map(|_| caps_for_steps(self.steps, 60.0 / speed_rpm));
+        let caps = self.caps.map(|_| caps_for_steps(self.step_count, 60.0 / speed_rpm));
         let corner_width_m = self.corner_width_m * (self.speed_rpm / speed_rpm);
         Self { speed_rpm, caps, corner_width_m, ..self }
     }
@@ -70,7 +70,7 @@ impl TurnSetup<'_> {
 
     /// Returns the length of a step (s).
     pub(super) fn step_s(&self) -> f64 {
-        self.turn_s() / self.steps as f64
+        self.turn_s() / self.step_count as f64
     }
 
     /// Returns the unit (1/s) of the speeds of disturbances, with which speeds and coordinates of
@@ -81,7 +81,7 @@ impl TurnSetup<'_> {
 
     /// Whether derivatives are those of the discrete steps instead of those of the motion.
     pub(super) fn differentiates_steps(&self) -> bool {
-        self.instants == self.steps
+        self.instant_count == self.step_count
     }
 
     /// Whether forces have corners.
@@ -90,7 +90,7 @@ impl TurnSetup<'_> {
     }
 
     pub(crate) fn batch_key(&self) -> BatchKey {
-        (self.steps, self.instants, self.caps.is_some(), self.has_corners())
+        (self.step_count, self.instant_count, self.caps.is_some(), self.has_corners())
     }
 }
 
@@ -99,7 +99,7 @@ impl TurnSetup<'_> {
 pub(crate) struct TurnRequest<'a> {
     pub(crate) setup: TurnSetup<'a>,
     /// The state at which the unbalance is up: coordinates (m, rad), then their speeds (per s).
-    pub(crate) start: [f64; STATES],
+    pub(crate) start_state: [f64; STATES],
     /// Whether the result has a record in addition to the end of the turn.
     pub(crate) is_recorded: bool,
 }
@@ -107,7 +107,7 @@ pub(crate) struct TurnRequest<'a> {
 /// The result of the integration of a turn.
 pub(crate) struct TurnResult {
     /// The state at the end.
-    pub(crate) end: [f64; STATES],
+    pub(crate) end_state: [f64; STATES],
     /// The record, if it was requested.
     pub(crate) record: Option<Box<OrbitRecord>>,
 }
@@ -128,8 +128,8 @@ pub(crate) struct OrbitRecord {
 /// not depend on the other turns. Once `cancel` is requested, results at the end are missing.
 pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) -> Vec<TurnResult> {
     // Recorded turns come first in a batch.
-    let key = |request: &TurnRequest<'_>| (request.setup.batch_key(), !request.is_recorded);
-    map_in_batches(requests, key, |requests| {
+    let request_key = |request: &TurnRequest<'_>| (request.setup.batch_key(), !request.is_recorded);
+    map_in_batches(requests, request_key, |requests| {
         let kernel = TurnKernel { requests, cancel };
         // Mostly empty wide lanes take longer than narrow lanes.
         let is_narrow_enough = requests.len() <= Simd::narrow_set().lanes();
@@ -153,10 +153,10 @@ pub(crate) fn map_in_batches<A: Copy, R>(
     key: impl Fn(&A) -> (BatchKey, bool),
     compute: impl Fn(&[A]) -> Vec<R>,
 ) -> Vec<R> {
-    let mut order: Vec<usize> = (0..items.len()).collect();
-    order.sort_by_key(|&k| key(&items[k]));
+    let mut item_order: Vec<usize> = (0..items.len()).collect();
+    item_order.sort_by_key(|&k| key(&items[k]));
     let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
-    for batch in order.chunk_by(|&a, &b| key(&items[a]).0 == key(&items[b]).0) {
+    for batch in item_order.chunk_by(|&a, &b| key(&items[a]).0 == key(&items[b]).0) {
         let batch_items: Vec<A> = batch.iter().map(|&k| items[k]).collect();
         for (&k, result) in batch.iter().zip(compute(&batch_items)) {
             results[k] = Some(result);
@@ -178,10 +178,13 @@ impl Kernel for TurnKernel<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut results = Vec::with_capacity(self.requests.len());
         let Some(first) = self.requests.first() else { return results };
-        let TurnSetup { steps, instants, .. } = first.setup;
+        let TurnSetup { step_count, instant_count, .. } = first.setup;
         let needs_weights = first.is_recorded && !first.setup.differentiates_steps();
-        let weights =
-            if needs_weights { interpolation_weights(steps, instants) } else { Vec::new() };
+        let weights = if needs_weights {
+            interpolation_weights(step_count, instant_count)
+        } else {
+            Vec::new()
+        };
         for requests in self.requests.chunks(T::LANES) {
             if self.cancel.is_requested() {
                 break;
@@ -193,9 +196,9 @@ impl Kernel for TurnKernel<'_> {
 }
 
 /// Returns the highest caps that are stable with a number of steps a turn.
-pub(super) fn caps_for_steps(steps: usize, turn_s: f64) -> Caps {
-    let cap = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
-    Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
+pub(super) fn caps_for_steps(step_count: usize, turn_s: f64) -> Caps {
+    let cap_rad_per_s = CAP_STABILITY_SHARE * RK4_STABILITY_LIMIT * step_count as f64 / turn_s;
+    Caps { bearings_rad_per_s: cap_rad_per_s, hinge_rad_per_s: Some(cap_rad_per_s) }
 }
 
 /// Returns a model with a set-up in each lane; surplus lanes repeat the last set-up.
@@ -220,9 +223,10 @@ pub(crate) fn lane_model<T: Lane, M: LaneModel<T>>(zero: N<T>, setups: &[TurnSet
 /// Returns the steps of the set-ups in lanes; surplus lanes repeat the last set-up.
 #[inline(always)]
 pub(crate) fn step_grid<T: Lane>(zero: N<T>, setups: &[TurnSetup<'_>]) -> StepGrid<T> {
-    let damping_factor = || libm::exp(-HINGE_DAMPING_PER_TURN / setups[0].steps as f64);
+    let damping_factor = || libm::exp(-HINGE_DAMPING_PER_TURN / setups[0].step_count as f64);
     let hinge_damping_factor = setups[0].differentiates_steps().then(damping_factor);
-    let mut grid = StepGrid { step_s: zero, steps: setups[0].steps, hinge_damping_factor };
+    let mut grid =
+        StepGrid { step_s: zero, step_count: setups[0].step_count, hinge_damping_factor };
     for lane in 0..T::LANES {
         grid.step_s.0.set(lane, setups[lane.min(setups.len() - 1)].step_s());
     }
@@ -241,36 +245,36 @@ fn integrate_batch<T: Lane>(
     let setups: Vec<TurnSetup<'_>> = requests.iter().map(|request| request.setup).collect();
     let grid = step_grid(zero, &setups);
     let model: Nonlinear<T> = lane_model(zero, &setups);
-    let mut ends = [[zero; STATES]];
+    let mut end_states = [[zero; STATES]];
     for lane in 0..T::LANES {
         for i in 0..STATES {
-            ends[0][i].0.set(lane, requests[lane.min(requests.len() - 1)].start[i]);
+            end_states[0][i].0.set(lane, requests[lane.min(requests.len() - 1)].start_state[i]);
         }
     }
     let recorded_count = requests.iter().filter(|request| request.is_recorded).count();
     let mut recorder = TurnRecorder::new(zero, &model, &grid);
     if !setups[0].differentiates_steps() {
         recorder.records_corner_forces = setups[0].has_corners();
-        recorder.instants = setups[0].instants.max(INSTANTS_PER_TURN);
+        recorder.instant_count = setups[0].instant_count.max(INSTANTS_PER_TURN);
     }
     integrate_turn(
         &model,
         &grid,
-        &mut ends,
+        &mut end_states,
         if recorded_count > 0 { Some(&mut recorder) } else { None },
     );
-    let mut monodromies: Vec<StateMatrix> = Vec::new();
+    let mut monodromy_matrices: Vec<StateMatrix> = Vec::new();
     if setups[0].differentiates_steps() {
-        for TurnRequest { setup, start, .. } in &requests[..recorded_count] {
-            let constant = zero.constant();
+        for TurnRequest { setup, start_state, .. } in &requests[..recorded_count] {
+            let dual_zero = zero.constant();
             let setups = [*setup];
-            let model = self::lane_model(constant, &setups);
-            let grid = self::step_grid(constant, &setups);
-            monodromies.push(zero.0.run_out_of_line(StepwiseMonodromy {
+            let model = self::lane_model(dual_zero, &setups);
+            let grid = self::step_grid(dual_zero, &setups);
+            monodromy_matrices.push(zero.0.run_out_of_line(StepwiseMonodromy {
                 zero,
                 model,
                 grid,
-                start: *start,
+                start_state: *start_state,
             }));
         }
     } else if recorded_count > 0 {
@@ -282,11 +286,11 @@ fn integrate_batch<T: Lane>(
             model: self::lane_model(zero.constant(), &repeated_setups),
             grid: self::step_grid(zero, &repeated_setups),
             turn_count: recorded_count,
-            instants: setups[0].instants,
-            states: &recorder.states[..recorder.instants],
+            instant_count: setups[0].instant_count,
+            states: &recorder.states[..recorder.instant_count],
             corner_forces: &recorder.corner_forces,
         };
-        monodromies = zero.0.run_out_of_line(monodromy);
+        monodromy_matrices = zero.0.run_out_of_line(monodromy);
     }
     let extract_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
         from_fn(|i| state[i].0.get(lane))
@@ -295,13 +299,13 @@ fn integrate_batch<T: Lane>(
         let record = request.is_recorded.then(|| {
             let clearance_m = request.setup.point.clearance_m();
             Box::new(OrbitRecord {
-                monodromy: monodromies[lane],
+                monodromy: monodromy_matrices[lane],
                 peaks: recorder.peaks.lane_peaks(lane),
                 min_gap_m: clearance_m - recorder.max_radial_squared.0.get(lane).sqrt(),
                 states: recorder.states.iter().map(|state| extract_lane(state, lane)).collect(),
             })
         });
-        results.push(TurnResult { end: extract_lane(&ends[0], lane), record });
+        results.push(TurnResult { end_state: extract_lane(&end_states[0], lane), record });
     }
 }
 
@@ -319,11 +323,15 @@ impl LinearResponse {
     /// Returns the speed amplitudes (m/s) of dampers.
     fn damper_speeds_m_per_s(&self, point: &Point) -> Vec<f64> {
         let speeds_at = |state| damper_speeds_m_per_s(point, state);
-        let speeds: Vec<Vec<f64>> =
+        let damper_speeds: Vec<Vec<f64>> =
             self.states[..INSTANTS_PER_TURN].iter().map(speeds_at).collect();
-        let sum_of_squares =
-            |k: usize| speeds.iter().map(|speeds| speeds[k] * speeds[k]).sum::<f64>();
-        (0..speeds[0].len())
+        let sum_of_squares = |k: usize| {
+            damper_speeds
+                .iter()
+                .map(|damper_speeds| damper_speeds[k] * damper_speeds[k])
+                .sum::<f64>()
+        };
+        (0..damper_speeds[0].len())
             .map(|k| (2.0 * sum_of_squares(k) / INSTANTS_PER_TURN as f64).sqrt())
             .collect()
     }
@@ -376,8 +384,9 @@ pub(super) fn solve_linear_responses(
     setups: &[TurnSetup<'_>],
     cancel: Cancel<'_>,
 ) -> Vec<LinearResponse> {
-    let compute = |setups: &[TurnSetup<'_>]| Simd::dispatch_narrow(LinearKernel { setups, cancel });
-    map_in_batches(setups, |setup| (setup.batch_key(), false), compute)
+    let compute_batch =
+        |setups: &[TurnSetup<'_>]| Simd::dispatch_narrow(LinearKernel { setups, cancel });
+    map_in_batches(setups, |setup| (setup.batch_key(), false), compute_batch)
 }
 
 /// The computation of the linear responses of set-ups with the same [`BatchKey`]. The period map is
@@ -413,29 +422,29 @@ fn solve_linear_batch<T: Lane>(
     let grid = step_grid(zero, setups);
     let model: Linear<T> = lane_model(zero, setups);
     // The first turn starts from rest, the others from a unit of each coordinate and speed.
-    let mut ends = vec![[zero; STATES]; 1 + STATES];
+    let mut end_states = vec![[zero; STATES]; 1 + STATES];
     for j in 0..STATES {
-        ends[1 + j][j] = zero.lit(1.0);
+        end_states[1 + j][j] = zero.lit(1.0);
     }
-    let mut start = [zero; STATES];
+    let mut start_state = [zero; STATES];
     // The turn from the fixed point is recorded. The loop compiles to a single copy of the model's
     // code.
     for is_from_fixed_point in [false, true] {
         if is_from_fixed_point {
-            ends.truncate(1);
-            ends[0] = start;
+            end_states.truncate(1);
+            end_states[0] = start_state;
         }
         let mut recorder = TurnRecorder::new(zero, &model, &grid);
         integrate_turn(
             &model,
             &grid,
-            &mut ends,
+            &mut end_states,
             if is_from_fixed_point { Some(&mut recorder) } else { None },
         );
         for lane in 0..setups.len() {
             if is_from_fixed_point {
                 responses.push(LinearResponse {
-                    state: from_fn(|i| start[i].0.get(lane)),
+                    state: from_fn(|i| start_state[i].0.get(lane)),
                     peaks: recorder.peaks.lane_peaks(lane),
                     states: recorder.states.iter().map(|x| from_fn(|i| x[i].0.get(lane))).collect(),
                 });
@@ -444,15 +453,17 @@ fn solve_linear_batch<T: Lane>(
             let mut matrix = [[N(0.0); STATES]; STATES];
             let mut end_from_rest = [N(0.0); STATES];
             for i in 0..STATES {
-                end_from_rest[i] = N(ends[0][i].0.get(lane));
+                end_from_rest[i] = N(end_states[0][i].0.get(lane));
                 for j in 0..STATES {
-                    matrix[i][j] = end_from_rest[i] - N(ends[1 + j][i].0.get(lane));
+                    matrix[i][j] = end_from_rest[i] - N(end_states[1 + j][i].0.get(lane));
                 }
                 matrix[i][i] = matrix[i][i] + 1.0;
             }
             let fixed_point = Lu::new(matrix).map(|factors| factors.solve(&end_from_rest));
             for i in 0..STATES {
-                start[i].0.set(lane, fixed_point.as_ref().map_or(f64::NAN, |state| state[i].0));
+                start_state[i]
+                    .0
+                    .set(lane, fixed_point.as_ref().map_or(f64::NAN, |state| state[i].0));
             }
         }
     }
@@ -463,7 +474,7 @@ pub(crate) struct TurnRecorder<'m, T, M> {
     model: &'m M,
     grid: &'m StepGrid<T>,
     /// The number of equally spaced instants in a turn.
-    instants: usize,
+    instant_count: usize,
     /// Whether to record the states at these instants.
     pub(crate) records_states: bool,
     pub(crate) peaks: Peaks<T, CHANNELS>,
@@ -486,7 +497,7 @@ impl<'m, T: Lane, M: LaneModel<T>> TurnRecorder<'m, T, M> {
         Self {
             model,
             grid,
-            instants: INSTANTS_PER_TURN,
+            instant_count: INSTANTS_PER_TURN,
             records_states: true,
             peaks: Peaks::new(zero),
             max_radial_squared: zero,
@@ -518,20 +529,21 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for CornerForcesAtState<'_, T, M> {
 impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M> {
     #[inline(always)]
     fn observe(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        if self.records_states && k.is_multiple_of(self.grid.steps / self.instants) {
+        if self.records_states && k.is_multiple_of(self.grid.step_count / self.instant_count) {
             self.states.push(*x);
         }
         if self.records_corner_forces {
             if k > 0 {
-                let [start, rate] = &self.last_sample;
+                let [start_state, rate] = &self.last_sample;
                 let eighth_step = (self.grid.step_s * 0.125).v();
-                let mut middle = *x;
+                let mut middle_state = *x;
                 for i in 0..STATES {
-                    middle[i] = (0.5 * (start[i] + x[i])).v() + eighth_step * (rate[i] - dx[i]);
+                    middle_state[i] =
+                        (0.5 * (start_state[i] + x[i])).v() + eighth_step * (rate[i] - dx[i]);
                 }
                 x[0].0.run_out_of_line(CornerForcesAtState {
                     model: self.model,
-                    x: &middle,
+                    x: &middle_state,
                     corner_forces: &mut self.corner_forces,
                 });
             }

@@ -23,7 +23,7 @@ const MAX_ITERATIONS: usize = 6;
 /// The computation of the monodromy matrix of a response, with speeds in the unit `unit_per_s`.
 pub(super) struct ReferenceMonodromy<'a> {
     setup: TurnSetup<'a>,
-    start: [f64; STATES],
+    start_state: [f64; STATES],
     unit_per_s: f64,
 }
 
@@ -31,14 +31,14 @@ impl<'a> ReferenceMonodromy<'a> {
     /// Creates the computation from a state close to the response.
     pub(super) fn new(
         setup: &TurnSetup<'a>,
-        start: [f64; STATES],
+        start_state: [f64; STATES],
         unit_per_s: f64,
     ) -> Result<Self, ModesError> {
         let highest_rad_per_s =
             highest_frequency_rad_per_s(setup.point, setup.speed_rpm * TAU / 60.0)?;
-        let steps =
+        let step_count =
             (setup.turn_s() * highest_rad_per_s / STEP_PHASE_RAD).ceil().max(100.0) as usize;
-        Ok(Self { setup: TurnSetup { steps, caps: None, ..*setup }, start, unit_per_s })
+        Ok(Self { setup: TurnSetup { step_count, caps: None, ..*setup }, start_state, unit_per_s })
     }
 }
 
@@ -52,10 +52,10 @@ impl OutOfLine for ReferenceMonodromy<'_> {
         let tangent_model: Nonlinear<Dual<f64>> = lane_model(zero, &[self.setup]);
         let grid = StepGrid {
             step_s: zero.lit(self.setup.step_s()),
-            steps: self.setup.steps,
+            step_count: self.setup.step_count,
             hinge_damping_factor: None,
         };
-        let mut x = self.start;
+        let mut x = self.start_state;
         for _ in 0..MAX_ITERATIONS {
             let mut columns = vec![[zero; STATES]; STATES];
             for j in 0..STATES {
@@ -101,26 +101,26 @@ impl OutOfLine for ReferenceMonodromy<'_> {
 
 /// Converts a matrix of derivatives to speeds in the unit `unit_per_s`.
 fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> StateMatrix {
-    let unit = |i: usize| if i < STATES / 2 { 1.0 } else { unit_per_s };
-    let mut scaled = *matrix;
+    let component_unit = |i: usize| if i < STATES / 2 { 1.0 } else { unit_per_s };
+    let mut scaled_matrix = *matrix;
     for i in 0..STATES {
         for j in 0..STATES {
-            scaled[i][j] = N(matrix[i][j].0 * unit(j) / unit(i));
+            scaled_matrix[i][j] = N(matrix[i][j].0 * component_unit(j) / component_unit(i));
         }
     }
-    scaled
+    scaled_matrix
 }
 
 /// The integral over a turn from a state of the sum of the Jacobian's diagonal.
 pub(super) struct TraceIntegral<'a> {
     pub(super) setup: TurnSetup<'a>,
-    pub(super) start: [f64; STATES],
+    pub(super) start_state: [f64; STATES],
 }
 
 struct TraceObserver<'m> {
     model: &'m Nonlinear<Dual<f64>>,
     step_s: f64,
-    steps: usize,
+    step_count: usize,
     integral: f64,
 }
 
@@ -132,7 +132,7 @@ impl StepObserver<Dual<f64>, Nonlinear<Dual<f64>>> for TraceObserver<'_> {
         x: &[N<Dual<f64>>; STATES],
         _: &[N<Dual<f64>>; STATES],
     ) {
-        if k == self.steps {
+        if k == self.step_count {
             return;
         }
         for j in STATES / 2..STATES {
@@ -151,10 +151,10 @@ impl OutOfLine for TraceIntegral<'_> {
         let zero = N(0.0).constant();
         let model: Nonlinear<Dual<f64>> = lane_model(zero, &[self.setup]);
         let step_s = self.setup.step_s();
-        let steps = self.setup.steps;
-        let grid = StepGrid { step_s: zero.lit(step_s), steps, hinge_damping_factor: None };
-        let mut states = [self.start.map(|x| zero.lit(x))];
-        let mut observer = TraceObserver { model: &model, step_s, steps, integral: 0.0 };
+        let step_count = self.setup.step_count;
+        let grid = StepGrid { step_s: zero.lit(step_s), step_count, hinge_damping_factor: None };
+        let mut states = [self.start_state.map(|x| zero.lit(x))];
+        let mut observer = TraceObserver { model: &model, step_s, step_count, integral: 0.0 };
         integrate_turn(&model, &grid, &mut states, Some(&mut observer));
         observer.integral
     }

@@ -94,9 +94,9 @@ pub fn find_responses(
 #[derive(Clone)]
 pub struct ResponseCurves<'a> {
     /// The curve from a low speed up.
-    upward: ResponseCurve<'a>,
+    upward_curve: ResponseCurve<'a>,
     /// The curve from a high speed down, if the upward curve is lost.
-    downward: Option<ResponseCurve<'a>>,
+    downward_curve: Option<ResponseCurve<'a>>,
 }
 
 impl<'a> ResponseCurves<'a> {
@@ -118,7 +118,8 @@ impl<'a> ResponseCurves<'a> {
             let end_rpm = start_response.map_or(OVERSHOOT_RATIO, |_| 1.0) * max_speed_rpm;
             (curve, lowest_rpm.map(|lowest_rpm| [lowest_rpm, end_rpm]))
         });
-        let Some(upward) = continue_between(curves_with_range.collect(), start_response, cancel)
+        let Some(upward_curve) =
+            continue_between(curves_with_range.collect(), start_response, cancel)
         else {
             return Vec::new();
         };
@@ -126,7 +127,7 @@ impl<'a> ResponseCurves<'a> {
         let is_lost = |curve: &ResponseCurve<'_>, max_speed_rpm: f64| {
             start_response.is_none() && curve.is_lost(max_speed_rpm)
         };
-        let lost_curves = upward
+        let lost_curves = upward_curve
             .iter()
             .zip(points)
             .filter(|(curve, (_, max_speed_rpm))| is_lost(curve, *max_speed_rpm));
@@ -139,24 +140,32 @@ impl<'a> ResponseCurves<'a> {
                 .filter(|(highest_rpm, lowest_rpm)| highest_rpm > lowest_rpm);
             (ResponseCurve::new(Settings::new(point)), range_rpm.map(<[f64; 2]>::from))
         });
-        let Some(downward) = continue_between(curves_with_range.collect(), None, cancel) else {
+        let Some(downward_curve) = continue_between(curves_with_range.collect(), None, cancel)
+        else {
             return Vec::new();
         };
-        let mut downward = downward.into_iter();
-        let curves = upward.into_iter().zip(points).map(|(upward, (_, max_speed_rpm))| {
-            let downward = if is_lost(&upward, *max_speed_rpm) { downward.next() } else { None };
-            Self { upward, downward }
-        });
+        let mut downward_curve = downward_curve.into_iter();
+        let curves =
+            upward_curve.into_iter().zip(points).map(|(upward_curve, (_, max_speed_rpm))| {
+                let downward_curve = if is_lost(&upward_curve, *max_speed_rpm) {
+                    downward_curve.next()
+                } else {
+                    None
+                };
+                Self { upward_curve, downward_curve }
+            });
         curves.collect()
     }
 
     /// Returns the guesses of the responses at a speed (rpm): those on the upward curve and, if
     /// that curve is lost, those on the downward curve, whose branches have the next numbers.
-    fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
-        let mut guesses = self.upward.guesses(speed_rpm);
-        if let Some(downward) = self.downward.as_ref().filter(|_| self.upward.is_lost(speed_rpm)) {
-            let downward_guesses = downward.guesses(speed_rpm).into_iter();
-            let first_branch = self.upward.fold_count() + 1;
+    fn guesses_at(&self, speed_rpm: f64) -> Vec<Guess> {
+        let mut guesses = self.upward_curve.guesses_at(speed_rpm);
+        if let Some(downward_curve) =
+            self.downward_curve.as_ref().filter(|_| self.upward_curve.is_lost(speed_rpm))
+        {
+            let downward_guesses = downward_curve.guesses_at(speed_rpm).into_iter();
+            let first_branch = self.upward_curve.fold_count() + 1;
             guesses.extend(
                 downward_guesses
                     .map(|guess| Guess { branch: first_branch + guess.branch, ..guess }),
@@ -192,13 +201,15 @@ impl<'a> ResponseCurves<'a> {
         let mut held_cases = Vec::with_capacity(requests.len());
         let mut setups = Vec::new();
         for &(curve, speed_rpm) in requests {
-            let Some(Self { upward, .. }) = curves.get_mut(curve) else { return stopped_results() };
-            let held_case = upward.settings.held_case(speed_rpm);
+            let Some(Self { upward_curve, .. }) = curves.get_mut(curve) else {
+                return stopped_results();
+            };
+            let held_case = upward_curve.settings.held_case(speed_rpm);
             setups.extend(
                 held_case
                     .as_ref()
                     .ok()
-                    .map(|held_case| upward.settings.linear_setup(held_case.setup)),
+                    .map(|held_case| upward_curve.settings.linear_setup(held_case.setup)),
             );
             held_cases.push(held_case);
         }
@@ -211,13 +222,13 @@ impl<'a> ResponseCurves<'a> {
         {
             let Ok(held_case) = held_case else { continue };
             let Some(linear_response) = linear_responses.next() else { continue };
-            let mut guesses = curves[*curve].guesses(*speed_rpm);
+            let mut guesses = curves[*curve].guesses_at(*speed_rpm);
             // Friction and stops may cause responses that are not on the curve. At a speed below
             // the beginning of the curve there is only one response.
             let is_off_curve = guesses.iter().all(|guess| !guess.is_on_curve);
             if is_off_curve || held_case.setup.has_corners() {
                 let branch = guesses.last().map_or(0, |last_guess| last_guess.branch + 1);
-                let first_rpm = curves[*curve].upward.settings.lowest_rpm();
+                let first_rpm = curves[*curve].upward_curve.settings.lowest_rpm();
                 let is_on_curve = first_rpm.is_ok_and(|first_rpm| *speed_rpm < first_rpm);
                 let guess = guess_from_linear(held_case.setup.point, &linear_response);
                 let position = if is_off_curve { 0 } else { guesses.len() };
@@ -230,7 +241,7 @@ impl<'a> ResponseCurves<'a> {
                     guess.factors.clone(),
                 ));
                 sought_responses.push(SoughtResponse {
-                    request,
+                    request_index: request,
                     held_case: held_case.clone(),
                     guess,
                     linear_peaks: linear_response.peaks,
@@ -267,40 +278,44 @@ impl<'a> ResponseCurves<'a> {
                 uncertain_responses.push((
                     index,
                     sought_responses[index].held_case.without_caps(),
-                    response.start,
+                    response.start_state,
                 ));
             }
         }
         let mut searches: Vec<(usize, NewtonSearch<'_>)> = Vec::new();
-        for (index, held_case, start) in uncertain_responses {
+        for (index, held_case, start_state) in uncertain_responses {
             match held_case {
                 Ok(held_case) => {
-                    searches.push((index, NewtonSearch::new(held_case.setup, start, None)));
+                    searches.push((index, NewtonSearch::new(held_case.setup, start_state, None)));
                     sought_responses[index].held_case = held_case;
                 }
                 Err(error) => results[index] = Err(error),
             }
         }
-        let starts: Vec<(usize, [f64; STATES])> =
+        let start_states: Vec<(usize, [f64; STATES])> =
             searches.iter().map(|(index, search)| (*index, search.state())).collect();
         if !run_and_store(&sought_responses, &mut results, searches, cancel) {
             return stopped_results();
         }
         // If a harmonic excites the hinge, the response may be far from the one with caps.
         let retries: [fn(&HeldCase<'a>, [f64; STATES]) -> NewtonSearch<'a>; 2] = [
-            |held_case, start| NewtonSearch::new_damped(held_case.setup, start, MAX_DAMPED_STEP),
-            |held_case, start| {
+            |held_case, start_state| {
+                NewtonSearch::new_damped(held_case.setup, start_state, MAX_DAMPED_STEP)
+            },
+            |held_case, start_state| {
                 NewtonSearch::new_after_transient(
                     held_case.setup,
-                    start,
-                    transient_turns(held_case),
+                    start_state,
+                    transient_turn_count(held_case),
                 )
             },
         ];
         for retry in retries {
-            let missing_starts = starts.iter().filter(|(index, _)| is_missing(&results[*index]));
-            let searches = missing_starts
-                .map(|(index, start)| (*index, retry(&sought_responses[*index].held_case, *start)));
+            let missing_starts =
+                start_states.iter().filter(|(index, _)| is_missing(&results[*index]));
+            let searches = missing_starts.map(|(index, start_state)| {
+                (*index, retry(&sought_responses[*index].held_case, *start_state))
+            });
             let searches: Vec<(usize, NewtonSearch<'_>)> = searches.collect();
             if !run_and_store(&sought_responses, &mut results, searches, cancel) {
                 return stopped_results();
@@ -315,7 +330,7 @@ impl<'a> ResponseCurves<'a> {
         let mut request_results: Vec<Result<Vec<Response>, ResponseError>> =
             held_cases.into_iter().map(|held_case| Err(error(held_case))).collect();
         for (sought_response, response) in sought_responses.iter().zip(results) {
-            let request_result = &mut request_results[sought_response.request];
+            let request_result = &mut request_results[sought_response.request_index];
             match (response, request_result.as_mut()) {
                 (Ok(response), Ok(responses)) => responses.push(response),
                 (Ok(response), Err(_)) => *request_result = Ok(vec![response]),
@@ -345,8 +360,8 @@ fn continue_between<'a>(
     let setups: Vec<TurnSetup<'_>> = curves
         .iter()
         .zip(&start_setups)
-        .filter_map(|(curve, start)| {
-            Some(TurnSetup { point: curve.settings.without_friction(), ..(*start)? })
+        .filter_map(|(curve, start_setup)| {
+            Some(TurnSetup { point: curve.settings.without_friction(), ..(*start_setup)? })
         })
         .collect();
     let linear_responses = solve_linear_responses(&setups, cancel);
@@ -356,15 +371,15 @@ fn continue_between<'a>(
             let linear_state = || guess_from_linear(setup.point, linear_response).state;
             NewtonSearch::new(
                 *setup,
-                start_response.map_or_else(linear_state, |response| response.start),
+                start_response.map_or_else(linear_state, |response| response.start_state),
                 None,
             )
         })
         .collect();
     let is_complete = run_searches(&mut searches, cancel);
     let mut searches = searches.into_iter();
-    for ((curve, range_rpm), start) in curves.iter_mut().zip(&ranges_rpm).zip(&start_setups) {
-        if let (Some(setup), Some([_, end_rpm])) = (start, range_rpm)
+    for ((curve, range_rpm), start_setup) in curves.iter_mut().zip(&ranges_rpm).zip(&start_setups) {
+        if let (Some(setup), Some([_, end_rpm])) = (start_setup, range_rpm)
             && let Some((state, _)) = searches.next().and_then(NewtonSearch::into_response)
         {
             curve.begin(setup.speed_rpm, &state, *end_rpm);
@@ -403,11 +418,11 @@ fn retry_missing_responses(
         let mut same_request = sought_responses
             .iter()
             .zip(results.iter())
-            .filter(|(other, _)| other.request == sought_response.request);
+            .filter(|(other, _)| other.request_index == sought_response.request_index);
         if !sought_response.guess.is_on_either_curve()
             && same_request.all(|(_, response)| is_missing(response))
         {
-            let turn_count = transient_turns(&sought_response.held_case);
+            let turn_count = transient_turn_count(&sought_response.held_case);
             let setup = sought_response.held_case.setup;
             let state = sought_response.guess.state;
             retries.push((index, NewtonSearch::new_after_transient(setup, state, turn_count)));
@@ -432,8 +447,9 @@ fn find_lost_branches(
     let indices: Vec<usize> = (0..sought_responses.len())
         .filter(|&index| sought_responses[index].guess.is_on_either_curve())
         .collect();
-    let curve_key =
-        |index: usize| (sought_responses[index].request, sought_responses[index].guess.is_on_curve);
+    let curve_key = |index: usize| {
+        (sought_responses[index].request_index, sought_responses[index].guess.is_on_curve)
+    };
     for curve_indices in indices.chunk_by(|&a, &b| curve_key(a) == curve_key(b)) {
         let missing_indices = curve_indices.iter().filter(|&&index| is_missing(&results[index]));
         let missing_indices: Vec<usize> = missing_indices.copied().collect();
@@ -442,7 +458,7 @@ fn find_lost_branches(
         }
         let known_responses: Vec<[f64; STATES]> = curve_indices
             .iter()
-            .filter_map(|&index| Some(results[index].as_ref().ok()?.start))
+            .filter_map(|&index| Some(results[index].as_ref().ok()?.start_state))
             .collect();
         for index in missing_indices {
             let SoughtResponse { held_case, guess, .. } = &sought_responses[index];
@@ -466,27 +482,27 @@ fn discard_duplicates(
     sought_responses: &[SoughtResponse<'_>],
     results: &mut [Result<Response, ResponseError>],
 ) {
-    let max_distance = |a: &[f64; STATES], b: &[f64; STATES]| {
+    let state_distance = |a: &[f64; STATES], b: &[f64; STATES]| {
         (0..COORDINATES).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
     };
     for index in 0..results.len() {
         for other_index in index + 1..results.len() {
-            let SoughtResponse { guess, request, .. } = &sought_responses[index];
+            let SoughtResponse { guess, request_index, .. } = &sought_responses[index];
             let other_response = &sought_responses[other_index];
-            if other_response.request != *request {
+            if other_response.request_index != *request_index {
                 break;
             }
             let are_on_curves =
                 guess.is_on_either_curve() && other_response.guess.is_on_either_curve();
             let are_separate =
-                max_distance(&guess.state, &other_response.guess.state) > SEPARATE_GUESS_DISTANCE;
+                state_distance(&guess.state, &other_response.guess.state) > SEPARATE_GUESS_DISTANCE;
             let (Ok(a), Ok(b)) = (&results[index], &results[other_index]) else { continue };
             if are_on_curves
                 && are_separate
-                && max_distance(&a.start, &b.start) < SAME_RESPONSE_DISTANCE
+                && state_distance(&a.start_state, &b.start_state) < SAME_RESPONSE_DISTANCE
             {
-                let first_distance = max_distance(&a.start, &guess.state);
-                let second_distance = max_distance(&b.start, &other_response.guess.state);
+                let first_distance = state_distance(&a.start_state, &guess.state);
+                let second_distance = state_distance(&b.start_state, &other_response.guess.state);
                 let farther_index =
                     if first_distance > second_distance { index } else { other_index };
                 results[farther_index] = Err(ResponseError::NoResponse);
@@ -501,7 +517,7 @@ fn is_missing(response: &Result<Response, ResponseError>) -> bool {
 }
 
 /// Returns the number of turns after which the suspension's slowest transient has decayed.
-fn transient_turns(held_case: &HeldCase<'_>) -> usize {
+fn transient_turn_count(held_case: &HeldCase<'_>) -> usize {
     let modes = &held_case.frozen_modes.modes[..SUSPENSION_MODES];
     let decay_per_s = modes.iter().map(|mode| -mode.re_per_s).fold(f64::INFINITY, f64::min);
     let transient_s = -libm::log(TRANSIENT_DECAY) / decay_per_s.max(0.0);
@@ -534,19 +550,22 @@ fn discard_known_responses(
     results: &mut [Result<Response, ResponseError>],
 ) {
     for index in 0..results.len() {
-        let SoughtResponse { request, guess, .. } = &sought_responses[index];
-        let Ok(Response { start, .. }) = &results[index] else { continue };
-        let is_same = |other: &Response| {
-            (0..COORDINATES).all(|i| (other.start[i] - start[i]).abs() < SAME_RESPONSE_DISTANCE)
+        let SoughtResponse { request_index, guess, .. } = &sought_responses[index];
+        let Ok(Response { start_state, .. }) = &results[index] else { continue };
+        let is_same_response = |other: &Response| {
+            (0..COORDINATES)
+                .all(|i| (other.start_state[i] - start_state[i]).abs() < SAME_RESPONSE_DISTANCE)
         };
-        let first_index =
-            sought_responses.partition_point(|sought_response| sought_response.request < *request);
+        let first_index = sought_responses
+            .partition_point(|sought_response| sought_response.request_index < *request_index);
         let last_index = if guess.is_on_either_curve() { index } else { results.len() };
-        let same_request = (first_index..last_index)
-            .take_while(|other_index| sought_responses[*other_index].request == *request);
+        let same_request = (first_index..last_index).take_while(|other_index| {
+            sought_responses[*other_index].request_index == *request_index
+        });
         let mut other_indices = same_request.filter(|other_index| *other_index != index);
         let is_known = !guess.is_on_curve
-            && other_indices.any(|other_index| results[other_index].as_ref().is_ok_and(is_same));
+            && other_indices
+                .any(|other_index| results[other_index].as_ref().is_ok_and(is_same_response));
         if is_known {
             results[index] = Err(ResponseError::NoResponse);
         }
@@ -564,10 +583,10 @@ fn find_changed_by_caps(
     let mut indices = Vec::new();
     let mut requests = Vec::new();
     for (index, (sought_response, response)) in sought_responses.iter().zip(results).enumerate() {
-        let hinge_rpm =
+        let hinge_frequency_rpm =
             sought_response.held_case.frozen_modes.modes[SUSPENSION_MODES].frequency_rpm();
         let may_excite_hinge = sought_response.held_case.setup.has_corners()
-            || hinge_rpm < MAX_HINGE_HARMONIC * sought_response.held_case.setup.speed_rpm;
+            || hinge_frequency_rpm < MAX_HINGE_HARMONIC * sought_response.held_case.setup.speed_rpm;
         if let (true, Ok(response), Some(_)) =
             (may_excite_hinge, response, sought_response.held_case.setup.caps)
             && let Ok(uncapped_case) = sought_response.held_case.without_caps()
@@ -575,7 +594,7 @@ fn find_changed_by_caps(
             indices.push(index);
             requests.push(TurnRequest {
                 setup: uncapped_case.setup,
-                start: response.start,
+                start_state: response.start_state,
                 is_recorded: false,
             });
         }
@@ -584,7 +603,7 @@ fn find_changed_by_caps(
         indices.into_iter().zip(&requests).zip(compute_turns(&requests, cancel))
     {
         let TurnSetup { point, speed_rpm, .. } = request.setup;
-        let residual = relative_residual(point, speed_rpm, &request.start, &result.end);
+        let residual = relative_residual(point, speed_rpm, &request.start_state, &result.end_state);
         changed_by_caps[index] = residual.is_nan() || residual > CAP_RESIDUAL_TOLERANCE;
     }
     changed_by_caps
@@ -602,7 +621,7 @@ fn guess_from_linear(point: &Point, linear_response: &LinearResponse) -> Guess {
 /// A response for which a search runs, and its guess.
 struct SoughtResponse<'a> {
     /// The index of the request.
-    request: usize,
+    request_index: usize,
     held_case: HeldCase<'a>,
     guess: Guess,
     /// The largest deviations by the linear model.
@@ -612,9 +631,9 @@ struct SoughtResponse<'a> {
 impl SoughtResponse<'_> {
     /// Returns the response that a search has found, unless it is too far from the guess.
     fn to_response(&self, search: NewtonSearch<'_>) -> Result<Response, ResponseError> {
-        let (start, record) = search.into_response().ok_or(ResponseError::NoResponse)?;
+        let (start_state, record) = search.into_response().ok_or(ResponseError::NoResponse)?;
         let is_far_from_guess =
-            |i: usize| (start[i] - self.guess.state[i]).abs() > MAX_GUESS_DISTANCE;
+            |i: usize| (start_state[i] - self.guess.state[i]).abs() > MAX_GUESS_DISTANCE;
         if self.guess.is_on_either_curve() && (0..COORDINATES).any(is_far_from_guess) {
             return Err(ResponseError::NoResponse);
         }
@@ -631,14 +650,14 @@ impl SoughtResponse<'_> {
             exceeded_limit: exceeded_limit(setup.point, &record),
             nonlinear_peaks: record.peaks,
             linear_peaks: self.linear_peaks,
-            start,
+            start_state,
             multiplier: [multiplier.re, multiplier.im].map(round_last_digits),
             participating_modes: Vec::new(),
         };
         if response.kind() != StabilityKind::Stable {
-            let speed = setup.speed_rpm * TAU / 60.0;
-            let frozen_modes =
-                modes(setup.point, 0.0, speed).map_err(|_| ResponseError::NoEigenvalues)?;
+            let speed_rad_per_s = setup.speed_rpm * TAU / 60.0;
+            let frozen_modes = modes(setup.point, 0.0, speed_rad_per_s)
+                .map_err(|_| ResponseError::NoEigenvalues)?;
             response.participating_modes =
                 participating_modes(setup.point, &frozen_modes, &vector, unit_per_s);
         }
@@ -679,20 +698,21 @@ pub(crate) fn leading_multiplier(
 /// Returns the limit of the machine's geometry that a motion exceeds, if it does.
 fn exceeded_limit(point: &Point, record: &OrbitRecord) -> Option<GeometryLimit> {
     let rest_vectors = attachment_vectors(point, point.equilibrium());
-    let mut exceeds = [false; 2];
+    let mut exceeds_limit = [false; 2];
     for state in &record.states {
-        let vectors_now = attachment_vectors(point, &core::array::from_fn(|i| state[i]));
-        for ((exceeds, now), rest_vector) in exceeds.iter_mut().zip(vectors_now).zip(&rest_vectors)
+        let current_vectors = attachment_vectors(point, &core::array::from_fn(|i| state[i]));
+        for ((exceeds_limit, now), rest_vector) in
+            exceeds_limit.iter_mut().zip(current_vectors).zip(&rest_vectors)
         {
-            *exceeds |= now.iter().zip(rest_vector).any(|(now, rest_vector)| {
+            *exceeds_limit |= now.iter().zip(rest_vector).any(|(now, rest_vector)| {
                 let projection: f64 = now.iter().zip(rest_vector).map(|(a, b)| a * b).sum();
                 projection.is_nan() || projection <= 0.0
             });
         }
     }
-    if exceeds[0] {
+    if exceeds_limit[0] {
         Some(GeometryLimit::SpringHooks)
-    } else if exceeds[1] {
+    } else if exceeds_limit[1] {
         Some(GeometryLimit::DamperEnds)
     } else if record.min_gap_m.is_nan() || record.min_gap_m <= 0.0 {
         Some(GeometryLimit::Clearance)
@@ -714,11 +734,11 @@ mod tests {
         let point = prepared(machine_with(0.3, 30.0), 100.0);
         let mut curves =
             ResponseCurves::continue_curves(&[(&point, 255.0)], None, Cancel::Never).remove(0);
-        let held_case = curves.upward.settings.held_case(255.0).unwrap();
-        let guesses = curves.guesses(255.0).into_iter();
+        let held_case = curves.upward_curve.settings.held_case(255.0).unwrap();
+        let guesses = curves.guesses_at(255.0).into_iter();
         let sought_responses: Vec<SoughtResponse<'_>> = guesses
             .map(|guess| SoughtResponse {
-                request: 0,
+                request_index: 0,
                 held_case: held_case.clone(),
                 guess,
                 linear_peaks: [0.0; CHANNELS],
@@ -747,18 +767,24 @@ mod tests {
                     Cancel::Never
                 ));
                 let [found_again, original] = [&restored_results, &results]
-                    .map(|responses| responses[index].as_ref().unwrap().start);
+                    .map(|responses| responses[index].as_ref().unwrap().start_state);
                 let differences = (0..COORDINATES).map(|i| (found_again[i] - original[i]).abs());
                 assert!(differences.fold(0.0, f64::max) < SAME_RESPONSE_DISTANCE, "{index}");
             }
         }
         // An even number of missing responses may have vanished at a fold, so that no search runs.
-        let mut both_missing = vec![
+        let mut results_with_two_missing = vec![
             Err(ResponseError::NoResponse),
             results[1].clone(),
             Err(ResponseError::NoResponse),
         ];
-        assert!(find_lost_branches(&sought_responses, &mut both_missing, Cancel::Never));
-        assert!(is_missing(&both_missing[0]) && is_missing(&both_missing[2]));
+        assert!(find_lost_branches(
+            &sought_responses,
+            &mut results_with_two_missing,
+            Cancel::Never
+        ));
+        assert!(
+            is_missing(&results_with_two_missing[0]) && is_missing(&results_with_two_missing[2])
+        );
     }
 }

@@ -31,7 +31,7 @@ struct AccuracyLimits {
     /// The least number of steps of a turn.
     min_steps: usize,
     /// The number of instants of a turn at which derivatives are computed, if no force has corners.
-    instants: usize,
+    instant_count: usize,
     /// The greatest product of step and frequency of the suspension's fastest mode (rad).
     max_step_phase_rad: f64,
     /// The greatest shift of the suspension's modes by caps (1/s, rad/s).
@@ -52,7 +52,7 @@ enum Purpose {
 /// The limits for responses at requested speeds.
 const RESPONSE_LIMITS: AccuracyLimits = AccuracyLimits {
     min_steps: 96,
-    instants: INSTANTS_PER_TURN,
+    instant_count: INSTANTS_PER_TURN,
     max_step_phase_rad: 0.25,
     max_shift_per_s: 3e-4,
     max_corner_step_s: 1e-4,
@@ -63,7 +63,7 @@ const RESPONSE_LIMITS: AccuracyLimits = AccuracyLimits {
 /// drum.
 const CONTINUATION_LIMITS: AccuracyLimits = AccuracyLimits {
     min_steps: 48,
-    instants: 8,
+    instant_count: 8,
     max_step_phase_rad: 0.4,
     max_shift_per_s: 3e-3,
     max_corner_step_s: f64::INFINITY,
@@ -126,11 +126,15 @@ impl<'a> HeldCase<'a> {
     /// derivatives are computed at as many instants as with corners: at fewer instants they lack
     /// that harmonic, and Newton's method fails.
     pub(crate) fn without_caps(&self) -> Result<Self, ResponseError> {
-        let steps =
+        let step_count =
             uncapped_step_count(self.setup.point, self.setup.speed_rpm, self.setup.turn_s())?;
-        let steps = steps.next_multiple_of(INSTANTS_PER_TURN_WITH_CORNERS);
-        let setup =
-            TurnSetup { steps, instants: INSTANTS_PER_TURN_WITH_CORNERS, caps: None, ..self.setup };
+        let step_count = step_count.next_multiple_of(INSTANTS_PER_TURN_WITH_CORNERS);
+        let setup = TurnSetup {
+            step_count,
+            instant_count: INSTANTS_PER_TURN_WITH_CORNERS,
+            caps: None,
+            ..self.setup
+        };
         Ok(Self {
             setup,
             frozen_modes: Arc::clone(&self.frozen_modes),
@@ -156,10 +160,14 @@ fn max_instants(point: &Point) -> usize {
 }
 
 /// Rounds a number of steps up to a multiple of [`max_instants`].
-fn round_up_steps(point: &Point, steps: f64) -> Result<usize, ResponseError> {
+fn round_up_steps(point: &Point, step_count: f64) -> Result<usize, ResponseError> {
     let divisor = max_instants(point) as f64;
-    let steps = divisor * (steps / divisor).ceil().max(1.0);
-    if steps > MAX_STEPS as f64 { Err(ResponseError::TooSlow) } else { Ok(steps as usize) }
+    let step_count = divisor * (step_count / divisor).ceil().max(1.0);
+    if step_count > MAX_STEPS as f64 {
+        Err(ResponseError::TooSlow)
+    } else {
+        Ok(step_count as usize)
+    }
 }
 
 /// The steps and caps of a point at all speeds.
@@ -183,7 +191,7 @@ pub(crate) struct Settings<'a> {
 #[derive(Clone)]
 struct RangeSetting {
     frozen_modes: Arc<Modes>,
-    steps: usize,
+    step_count: usize,
     is_capped: bool,
 }
 
@@ -264,10 +272,16 @@ impl<'a> Settings<'a> {
         let Some(min_steps) = self.min_continuation_steps else {
             return Ok(self.case_for(speed_rpm, Purpose::Continuation)?.setup);
         };
-        let steps = self.continuation_steps(min_steps)?;
-        let caps = Some(caps_for_steps(steps, 60.0 / speed_rpm));
-        let setup =
-            TurnSetup { point, speed_rpm, steps, instants: steps, caps, corner_width_m: 0.0 };
+        let step_count = self.continuation_steps(min_steps)?;
+        let caps = Some(caps_for_steps(step_count, 60.0 / speed_rpm));
+        let setup = TurnSetup {
+            point,
+            speed_rpm,
+            step_count,
+            instant_count: step_count,
+            caps,
+            corner_width_m: 0.0,
+        };
         Ok(TurnSetup { corner_width_m: CORNER_WIDTH_PER_STEP_M_PER_S * setup.step_s(), ..setup })
     }
 
@@ -278,11 +292,11 @@ impl<'a> Settings<'a> {
         let highest_frequency_rad_per_s =
             modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
-        let steps = round_up_steps(
+        let step_count = round_up_steps(
             self.point,
             highest_frequency_rad_per_s * longest_turn_s / CONTINUATION_LIMITS.max_step_phase_rad,
         )?;
-        Ok(steps.max(min_steps))
+        Ok(step_count.max(min_steps))
     }
 
     /// Returns the number of steps of a turn in the continuation, if forces have corners.
@@ -295,9 +309,10 @@ impl<'a> Settings<'a> {
 
     /// Doubles the number of steps in the continuation; returns false if it exceeds its limit.
     pub(super) fn refine_continuation(&mut self) -> bool {
-        let steps = self.min_continuation_steps.map_or(MIN_CONTINUATION_STEPS, |steps| 2 * steps);
-        self.min_continuation_steps = Some(steps);
-        steps <= MAX_CONTINUATION_STEPS
+        let step_count =
+            self.min_continuation_steps.map_or(MIN_CONTINUATION_STEPS, |step_count| 2 * step_count);
+        self.min_continuation_steps = Some(step_count);
+        step_count <= MAX_CONTINUATION_STEPS
     }
 
     /// Returns the case at a speed for a purpose, with the setting of the speed's range.
@@ -317,11 +332,12 @@ impl<'a> Settings<'a> {
             self.settings_by_range.insert((range, purpose), setting.clone());
             setting
         });
-        let RangeSetting { frozen_modes, steps, is_capped } = setting?;
+        let RangeSetting { frozen_modes, step_count, is_capped } = setting?;
         let point = self.point;
-        let caps = is_capped.then(|| caps_for_steps(steps, 60.0 / speed_rpm));
-        let instants = limits.instants * max_instants(point) / INSTANTS_PER_TURN;
-        let setup = TurnSetup { point, speed_rpm, steps, instants, caps, corner_width_m: 0.0 };
+        let caps = is_capped.then(|| caps_for_steps(step_count, 60.0 / speed_rpm));
+        let instant_count = limits.instant_count * max_instants(point) / INSTANTS_PER_TURN;
+        let setup =
+            TurnSetup { point, speed_rpm, step_count, instant_count, caps, corner_width_m: 0.0 };
         let counted_mode_count = if is_capped { SUSPENSION_MODES } else { SUSPENSION_MODES + 2 };
         Ok(HeldCase { setup, frozen_modes, counted_mode_count })
     }
@@ -352,13 +368,13 @@ impl<'a> Settings<'a> {
         let turn_s = 60.0 / bounds_rpm[0];
         let highest_frequency_rad_per_s =
             modes_at_rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
-        let mut steps = round_up_steps(
+        let mut step_count = round_up_steps(
             point,
             highest_frequency_rad_per_s * turn_s / limits.max_step_phase_rad,
         )?
         .max(limits.min_steps);
         if point.machine.elements.has_nonsmooth_force() {
-            steps = steps.max(round_up_steps(point, turn_s / limits.max_corner_step_s)?);
+            step_count = step_count.max(round_up_steps(point, turn_s / limits.max_corner_step_s)?);
         }
         let mut is_capped = false;
         let max_speed_rad_per_s = bounds_rpm[1] * TAU / 60.0;
@@ -367,9 +383,9 @@ impl<'a> Settings<'a> {
         {
             let highest_rad_per_s = modes_at_rest.modes[COORDINATES - 1].magnitude_rad_per_s;
             // With more steps caps would exceed all modes.
-            while !is_capped && (steps as f64) < highest_rad_per_s * turn_s {
+            while !is_capped && (step_count as f64) < highest_rad_per_s * turn_s {
                 let compute_shift_per_s = |bound: usize| {
-                    let caps = caps_for_steps(steps, 60.0 / bounds_rpm[bound]);
+                    let caps = caps_for_steps(step_count, 60.0 / bounds_rpm[bound]);
                     max_shift_per_s(
                         &self.frictionless_point,
                         bounds_rpm[bound] * TAU / 60.0,
@@ -380,16 +396,16 @@ impl<'a> Settings<'a> {
                 is_capped =
                     compute_shift_per_s(0)?.max(compute_shift_per_s(1)?) <= limits.max_shift_per_s;
                 if !is_capped {
-                    steps = round_up_steps(point, STEP_COUNT_INCREASE * steps as f64)?;
+                    step_count = round_up_steps(point, STEP_COUNT_INCREASE * step_count as f64)?;
                 }
             }
         }
         if !is_capped {
             let [low, high] = bounds_rpm.map(|rpm| uncapped_step_count(point, rpm, turn_s));
-            steps = low?.max(high?);
+            step_count = low?.max(high?);
         }
         let [frozen_modes, _] = frozen_modes;
-        Ok(RangeSetting { frozen_modes, steps, is_capped })
+        Ok(RangeSetting { frozen_modes, step_count, is_capped })
     }
 }
 

@@ -16,7 +16,7 @@ pub(super) struct StepwiseMonodromy<T> {
     /// The model and the steps, the same in every lane.
     pub(super) model: Nonlinear<Dual<T>>,
     pub(super) grid: StepGrid<Dual<T>>,
-    pub(super) start: [f64; STATES],
+    pub(super) start_state: [f64; STATES],
 }
 
 impl<T: Lane> OutOfLine for StepwiseMonodromy<T> {
@@ -28,7 +28,7 @@ impl<T: Lane> OutOfLine for StepwiseMonodromy<T> {
         for j in 0..STATES {
             let lane_group = &mut lane_groups[j / T::LANES];
             for i in 0..STATES {
-                lane_group[i].0.value.set(j % T::LANES, self.start[i]);
+                lane_group[i].0.value.set(j % T::LANES, self.start_state[i]);
             }
             lane_group[j].0.slope.set(j % T::LANES, 1.0);
         }
@@ -80,20 +80,27 @@ mod tests {
         assert_eq!(plain_responses.len(), 6);
         for responses in other_responses {
             assert_eq!(responses.len(), plain_responses.len());
-            for (with_element, without_element) in responses.iter().zip(&plain_responses) {
-                let speed_rpm = with_element.speed_rpm;
-                assert_eq!(with_element.branch, without_element.branch, "{speed_rpm}");
-                for (a, b) in
-                    with_element.nonlinear_peaks.iter().zip(&without_element.nonlinear_peaks)
+            for (response_with_element, response_without_element) in
+                responses.iter().zip(&plain_responses)
+            {
+                let speed_rpm = response_with_element.speed_rpm;
+                assert_eq!(
+                    response_with_element.branch, response_without_element.branch,
+                    "{speed_rpm}"
+                );
+                for (a, b) in response_with_element
+                    .nonlinear_peaks
+                    .iter()
+                    .zip(&response_without_element.nonlinear_peaks)
                 {
                     assert!((a / b - 1.0).abs() < 1e-3, "{speed_rpm}: {a} for {b}");
                 }
-                let folds = with_element
+                let fold_pairs = response_with_element
                     .fold_speeds_rpm
                     .iter()
                     .flatten()
-                    .zip(without_element.fold_speeds_rpm.iter().flatten());
-                assert!(folds.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{speed_rpm}");
+                    .zip(response_without_element.fold_speeds_rpm.iter().flatten());
+                assert!(fold_pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{speed_rpm}");
             }
         }
     }

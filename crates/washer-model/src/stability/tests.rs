@@ -79,10 +79,11 @@ fn response_at(machine: Machine, speed_rpm: f64) -> Response {
 }
 
 /// Returns the multipliers of the machine without caps, by plain Runge-Kutta, the largest first.
-fn reference_multipliers(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
+fn reference_multipliers(machine: Machine, speed_rpm: f64, start_state: [f64; STATES]) -> Vec<c64> {
     let point = prepared(machine, speed_rpm);
     let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
-    let matrix = Simd::one_lane(ReferenceMonodromy::new(&setup, start, 1e4).unwrap()).unwrap();
+    let matrix =
+        Simd::one_lane(ReferenceMonodromy::new(&setup, start_state, 1e4).unwrap()).unwrap();
     let matrix = Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0);
     let mut multipliers = matrix.eigenvalues().unwrap();
     multipliers.sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()));
@@ -90,14 +91,14 @@ fn reference_multipliers(machine: Machine, speed_rpm: f64, start: [f64; STATES])
 }
 
 /// Finds the response near a state, and all of its multipliers.
-fn find_response(setup: &TurnSetup<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
-    let mut searches = [NewtonSearch::new(*setup, start, None)];
+fn find_response(setup: &TurnSetup<'_>, start_state: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
+    let mut searches = [NewtonSearch::new(*setup, start_state, None)];
     assert!(run_searches(&mut searches, Cancel::Never));
     let [search] = searches;
-    let (start, record) = search.into_response().unwrap();
+    let (start_state, record) = search.into_response().unwrap();
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { setup.unit_per_s() };
     let matrix = Mat::from_fn(STATES, STATES, |i, j| record.monodromy[i][j].0 * unit(j) / unit(i));
-    (start, matrix.eigenvalues().unwrap())
+    (start_state, matrix.eigenvalues().unwrap())
 }
 
 #[test]
@@ -177,7 +178,7 @@ fn multipliers_are_those_of_the_machine_without_caps() {
         (machine_with(0.4, 140.0), 1200.0),
     ] {
         let computed = response_at(machine.clone(), speed_rpm);
-        let expected = reference_multipliers(machine, speed_rpm, computed.start);
+        let expected = reference_multipliers(machine, speed_rpm, computed.start_state);
         let mu = c64::new(computed.multiplier[0], computed.multiplier[1]);
         let nearest = expected
             .iter()
@@ -224,17 +225,18 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
     let speed_rpm = response.speed_rpm;
     let point = prepared(machine, speed_rpm);
     let step_s = if point.machine.elements.has_nonsmooth_force() { 5e-5 } else { 2e-4 };
-    let mut start = InitialDeviation::default();
+    let mut initial_deviation = InitialDeviation::default();
     for i in 0..COORDINATES {
-        start.deviations[i] = response.start[i] - point.equilibrium()[i];
-        start.speeds[i] = response.start[COORDINATES + i];
+        initial_deviation.deviations[i] = response.start_state[i] - point.equilibrium()[i];
+        initial_deviation.speeds[i] = response.start_state[COORDINATES + i];
     }
     for i in [4, 5] {
-        start.deviations[i] += 1e-6;
+        initial_deviation.deviations[i] += 1e-6;
     }
     let turn_s = 60.0 / speed_rpm;
     let method = Method::rk4(step_s);
-    let history = integrate_history(ModelKind::Nonlinear, &method, &point, &start, turn_s);
+    let history =
+        integrate_history(ModelKind::Nonlinear, &method, &point, &initial_deviation, turn_s);
     let turn_count = (TIMING.end_s.min(end_s) / turn_s) as usize;
     let states: Vec<[f64; COORDINATES]> =
         (0..turn_count).map(|k| history.instant_outputs(k).unwrap().deviations).collect();
@@ -404,11 +406,11 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let point = prepared(machine_with(0.4, 140.0), 250.0);
     let capped = Settings::new(&point).held_case(250.0).unwrap().setup;
     // The steps are so short that the formula adds no damping to the capped modes.
-    let setup = TurnSetup { steps: 32 * capped.steps, ..capped };
-    let nearby_start = response_at(machine_with(0.4, 140.0), 250.0).start;
-    let (start, multipliers) = find_response(&setup, nearby_start);
+    let setup = TurnSetup { step_count: 32 * capped.step_count, ..capped };
+    let nearby_start = response_at(machine_with(0.4, 140.0), 250.0).start_state;
+    let (start_state, multipliers) = find_response(&setup, nearby_start);
     let product = multipliers.into_iter().product::<c64>();
-    let trace = Simd::one_lane(TraceIntegral { setup, start });
+    let trace = Simd::one_lane(TraceIntegral { setup, start_state });
     let error = product.re.ln() / trace - 1.0;
     println!("{product} {trace} {error:e}");
     assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace} {error:e}");
@@ -660,7 +662,7 @@ fn continued_responses_are_those_of_short_steps() {
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
     let mut states: Vec<Option<[f64; STATES]>> = points
         .iter()
-        .map(|point| Some(responses_of_point(point, &[speed_rpm_at(0)])[0].start))
+        .map(|point| Some(responses_of_point(point, &[speed_rpm_at(0)])[0].start_state))
         .collect();
     // The change of each response by the last step. Near a resonance responses change much in a
     // step, but by similar amounts in successive steps.
@@ -683,12 +685,14 @@ fn continued_responses_are_those_of_short_steps() {
         let mut searches = searches.into_iter();
         for (k, state) in states.iter_mut().enumerate() {
             let Some(previous_state) = *state else { continue };
-            let next_state = searches.next().unwrap().into_response().map(|(start, _)| start);
+            let next_state =
+                searches.next().unwrap().into_response().map(|(start_state, _)| start_state);
             let distance = |to: &[f64; STATES]| {
                 (0..COORDINATES).map(|i| (to[i] - previous_state[i]).abs()).fold(0.0, f64::max)
             };
-            *state =
-                next_state.filter(|start| distance(start) < f64::max(1e-3, 5.0 * last_changes[k]));
+            *state = next_state.filter(|start_state| {
+                distance(start_state) < f64::max(1e-3, 5.0 * last_changes[k])
+            });
             last_changes[k] = state.as_ref().map_or(0.0, distance);
             if state.is_none() {
                 jumps.push((k, speed_rpm_at(step)));
@@ -710,7 +714,8 @@ fn continued_responses_are_those_of_short_steps() {
     for (responses, (k, speed_rpm, state)) in all_responses(&held_speeds).into_iter().zip(&samples)
     {
         let difference = responses.map_or(f64::NAN, |responses| {
-            let difference = (0..COORDINATES).map(|i| (responses[0].start[i] - state[i]).abs());
+            let difference =
+                (0..COORDINATES).map(|i| (responses[0].start_state[i] - state[i]).abs());
             difference.fold(0.0, f64::max)
         });
         max_error = max_error.max(difference);
@@ -746,7 +751,7 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
         .map(|(&rpm, computed)| {
             NewtonSearch::new(
                 settings.held_case(rpm).unwrap().without_caps().unwrap().setup,
-                computed.start,
+                computed.start_state,
                 None,
             )
         })

@@ -9,7 +9,7 @@ pub(crate) struct StepGrid<T> {
     /// The length of a step (s).
     pub(super) step_s: N<T>,
     /// The number of steps of a turn.
-    pub(super) steps: usize,
+    pub(super) step_count: usize,
     /// The factor of the hinge's speeds after each step, if the hinge is damped numerically.
     pub(super) hinge_damping_factor: Option<f64>,
 }
@@ -17,8 +17,8 @@ pub(crate) struct StepGrid<T> {
 impl<T: Lane> StepGrid<T> {
     /// Returns the time (s) after a number of steps.
     #[inline(always)]
-    pub(super) fn time_s(&self, steps: f64) -> N<T> {
-        (self.step_s * steps).v()
+    pub(super) fn time_s(&self, step_count: f64) -> N<T> {
+        (self.step_s * step_count).v()
     }
 }
 
@@ -57,8 +57,8 @@ fn update_forcings<T: Lane, S: System<T, STATES>>(
     let k = k as f64;
     forcings[0] = forcings[2];
     // A loop compiles to a single copy of its code.
-    for (instant, steps) in [(1, 0.5), (2, 1.0)] {
-        system.update_forcing(grid.time_s(k + steps), &mut forcings[instant]);
+    for (instant, step_count) in [(1, 0.5), (2, 1.0)] {
+        system.update_forcing(grid.time_s(k + step_count), &mut forcings[instant]);
     }
 }
 
@@ -133,12 +133,12 @@ pub(crate) fn integrate_turn<T: Lane, S: System<T, STATES>, W: StepObserver<T, S
 ) {
     let mut forcings = first_forcings(system, grid);
     // An observer needs a further step for the slope at the turn's end.
-    let steps = grid.steps + usize::from(observer.is_some());
-    for k in 0..steps {
+    let step_count = grid.step_count + usize::from(observer.is_some());
+    for k in 0..step_count {
         if k > 0 {
             update_forcings(system, grid, k, &mut forcings);
         }
-        let stage_count = if k < grid.steps { STAGE_INSTANTS.len() } else { 1 };
+        let stage_count = if k < grid.step_count { STAGE_INSTANTS.len() } else { 1 };
         for (index, x) in states.iter_mut().enumerate() {
             let observer = match &mut observer {
                 Some(observer) if index == 0 => Some((k, &mut **observer)),
@@ -147,7 +147,7 @@ pub(crate) fn integrate_turn<T: Lane, S: System<T, STATES>, W: StepObserver<T, S
             compute_stages(system, grid.step_s, &forcings, x, stage_count, observer);
             // The further step changes no state.
             if let Some(damping_factor) = grid.hinge_damping_factor
-                && k < grid.steps
+                && k < grid.step_count
             {
                 for i in [HINGE_YAW, HINGE_PITCH] {
                     x[COORDINATES + i] = (x[COORDINATES + i] * damping_factor).v();

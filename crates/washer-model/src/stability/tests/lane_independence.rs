@@ -47,7 +47,7 @@ fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
 }
 
 fn bits(result: &TurnResult) -> Vec<u64> {
-    let mut numbers: Vec<f64> = result.end.to_vec();
+    let mut numbers: Vec<f64> = result.end_state.to_vec();
     if let Some(record) = &result.record {
         numbers.extend(record.monodromy.iter().flatten().map(|entry| entry.0));
         numbers.extend(record.peaks);
@@ -83,7 +83,7 @@ fn turns_do_not_depend_on_other_lanes() {
             };
             let equilibrium = settings.point.equilibrium();
             let size = 0.02 * numbers.f64();
-            let start = core::array::from_fn(|i| {
+            let start_state = core::array::from_fn(|i| {
                 let offset = size * (2.0 * numbers.f64() - 1.0);
                 if i < 2 || (4..6).contains(&i) {
                     equilibrium[i] + offset
@@ -93,7 +93,7 @@ fn turns_do_not_depend_on_other_lanes() {
                     offset
                 }
             });
-            requests.push(TurnRequest { setup, start, is_recorded: numbers.bool() });
+            requests.push(TurnRequest { setup, start_state, is_recorded: numbers.bool() });
         }
         let results = compute_turns(&requests, Cancel::Never);
         for (request, result) in requests.iter().zip(&results) {
@@ -103,8 +103,8 @@ fn turns_do_not_depend_on_other_lanes() {
                 bits(&alone) == bits(result),
                 "machine {number}, elements {element_kinds:b}, {key:?}, recorded {}: {:?} {:?}",
                 request.is_recorded,
-                alone.end,
-                result.end
+                alone.end_state,
+                result.end_state
             );
         }
     }
