@@ -46,9 +46,9 @@ fn check_plan(plan: &Plan) {
     assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
     assert_eq!(Job::new(plan).hash(), Job::new(plan).hash());
-    let machines: Vec<_> = (0..plan.corners().min(4))
+    let machines: Vec<_> = (0..plan.corner_count().min(4))
         .map(|corner| {
-            let input = sweep::point_input(plan, &plan.corner(corner));
+            let input = sweep::point_input(plan, &plan.corner_values(corner));
             assert_eq!(input.machine.violations(), []);
             assert_eq!(input.spin.violations(), []);
             (input.machine, input.spin)

@@ -5,7 +5,9 @@ use std::marker::PhantomData;
 
 use lane_ode::{Cancel, MAX_LANES, Simd};
 use serde_json::Value;
-use sweep_engine::columns::{Compared, ComparisonColumns, ResultColumn, declared, pass_rows};
+use sweep_engine::columns::{
+    ComparisonColumns, ResultColumn, RowComparison, into_declarations, pass_rows,
+};
 use sweep_engine::config::Keys;
 use sweep_engine::method::{ACCURACY, DOPRI5, IntegrationMethod, RK4, StepRule, Steps};
 use sweep_engine::store::{Layout, axis_columns};
@@ -137,7 +139,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
     }
 
     fn layout(plan: &Plan<Self>) -> Layout {
-        Layout::map(axis_columns(plan), declared(map_columns(plan)))
+        Layout::map(axis_columns(plan), into_declarations(map_columns(plan)))
     }
 
     fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
@@ -196,19 +198,19 @@ impl<const C: usize> PointRuns<C> {
     }
 
     /// Returns the comparison as columns read it.
-    fn compared_models(&self) -> Compared<'_> {
-        Compared {
+    fn compared_models(&self) -> RowComparison<'_> {
+        RowComparison {
             amplitudes: self.amplitudes.each_ref().map(Vec::as_slice),
             verdict: &self.verdict,
-            converged: self.converged,
+            is_converged: self.converged,
             // Chaos is not examined.
-            sensitive: None,
-            method: self.method,
-            error: self.relative_error,
-            status: self.status(),
+            is_sensitive: None,
+            method_index: self.method,
+            relative_error: self.relative_error,
+            status_index: self.status(),
             fail_time_s: self.model_runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
-            steps: self.model_runs.map(|run| run.steps),
-            rejected: self.model_runs.map(|run| run.rejected),
+            accepted_steps: self.model_runs.map(|run| run.steps),
+            rejected_steps: self.model_runs.map(|run| run.rejected),
         }
     }
 }
@@ -219,15 +221,15 @@ fn map_columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: 
     let comparison = ComparisonColumns {
         channels: &plan.reliability.channels,
         limits: plan.reliability.limits,
-        compared: PointRuns::compared_models,
+        row_comparison: PointRuns::compared_models,
     };
     let amplitude_description = "largest deviation from equilibrium in the window";
     let ratio_description =
         "nonlinear over linear amplitude; null where the linear one is zero or a model failed";
-    let mut result_columns = comparison.amplitudes(amplitude_description, ratio_description);
+    let mut result_columns = comparison.amplitude_columns(amplitude_description, ratio_description);
     let method_description = "the method that the row's numbers come from";
-    result_columns.extend(comparison.verdict(METHOD_NAMES.to_vec(), method_description));
-    result_columns.extend(comparison.runs(STATUS_NAMES.to_vec()));
+    result_columns.extend(comparison.verdict_columns(METHOD_NAMES.to_vec(), method_description));
+    result_columns.extend(comparison.run_columns(STATUS_NAMES.to_vec()));
     result_columns
 }
 

@@ -52,7 +52,9 @@ pub use form::Form;
 pub use keys::{Key, KeyWalk, Keys};
 pub use points::{check_columns, not_numbers_mistake, wrong_length_mistake};
 pub use report::{Diagnostic, Diagnostics, Mistake, Report};
-pub use section::{Field, Section, quote, refused_number, shorten, unknown_word, written_twice};
+pub use section::{
+    Field, Section, number_mistake, quote, shorten, unknown_word_mistake, written_twice_mistake,
+};
 pub use sections::parse_name;
 pub use source::{Located, Location, SourceId, Sources};
 
@@ -73,7 +75,7 @@ pub struct GridInput<M> {
     /// The text of the model's own file, if it is not the one that the grid names.
     pub model_file: Option<String>,
     /// The arguments NAME=VALUE of `--set`.
-    sets: Vec<String>,
+    set_arguments: Vec<String>,
     /// The arguments NAME=VALUE of `--at`.
     at_arguments: Vec<String>,
     model: PhantomData<M>,
@@ -86,7 +88,7 @@ impl<M: Model> GridInput<M> {
         let text = None;
         let model_file = None;
         let at_arguments = Vec::new();
-        Self { path, name, text, model_file, sets, at_arguments, model: PhantomData }
+        Self { path, name, text, model_file, set_arguments: sets, at_arguments, model: PhantomData }
     }
 
     /// Returns the input of a grid's text. `name` stands in messages, and is the run's name if the
@@ -109,8 +111,8 @@ impl<M: Model> GridInput<M> {
         let grid_keys = plan.as_object().into_iter().flatten().filter(|(key, _)| is_grid_key(key));
         let model_file_keys = model_file_key.and_then(|key| plan.get(key)?.as_object());
         Self {
-            text: Some(plan_to_toml::file(grid_keys)),
-            model_file: model_file_keys.map(plan_to_toml::file),
+            text: Some(plan_to_toml::format_toml(grid_keys)),
+            model_file: model_file_keys.map(plan_to_toml::format_toml),
             ..Self::file(name.into(), Vec::new())
         }
     }
@@ -133,7 +135,7 @@ impl<M: Model> GridInput<M> {
     /// # Errors
     /// Every mistake found, in one pass.
     pub fn load(&self) -> Result<Plan<M>, Diagnostics> {
-        resolve(self, |_| ()).map(|(plan, ())| plan)
+        read_plan(self, |_| ()).map(|(plan, ())| plan)
     }
 
     /// Reads the grid for one point. `at_arguments` has arguments NAME=VALUE for each axis of
@@ -146,14 +148,14 @@ impl<M: Model> GridInput<M> {
         &self,
         at_arguments: &[String],
     ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
-        resolve(self, |draft| parameters::fix_point(at_arguments, draft))
+        read_plan(self, |draft| parameters::fix_point(at_arguments, draft))
     }
 }
 
 /// Parameters by name with their values.
 pub type NamedValues = Vec<(String, f64)>;
 
-fn resolve<M: Model, T>(
+fn read_plan<M: Model, T>(
     input: &GridInput<M>,
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {

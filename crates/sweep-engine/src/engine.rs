@@ -38,8 +38,8 @@ pub fn evaluate_points(
     axis_values: &[Vec<f64>],
     context: &RunContext<'_>,
 ) -> Option<Vec<PointRows>> {
-    let queue = Mutex::new(axis_values.iter().enumerate());
-    let source = || lock(&queue).next().map(|(point, values)| (point as u64, values.clone()));
+    let point_queue = Mutex::new(axis_values.iter().enumerate());
+    let source = || lock(&point_queue).next().map(|(point, values)| (point as u64, values.clone()));
     let results = Mutex::new(Vec::with_capacity(axis_values.len()));
     let sink = |result: PointRows| lock(&results).push(result);
     evaluator.evaluate(&source, &sink, context);
@@ -145,16 +145,16 @@ pub struct IncompleteGroups(pub Mutex<BTreeMap<u64, Vec<PointRows>>>);
 impl IncompleteGroups {
     /// Adds a result to a group of `size` results. Returns the group's results, sorted by point, if
     /// that completes it.
-    pub fn add(&self, group: u64, size: u64, result: PointRows) -> Option<Vec<PointRows>> {
+    pub fn add_result(&self, group: u64, size: u64, result: PointRows) -> Option<Vec<PointRows>> {
         let mut groups = lock(&self.0);
         let results = groups.entry(group).or_default();
         results.push(result);
         if (results.len() as u64) < size {
             return None;
         }
-        let mut complete = groups.remove(&group)?;
+        let mut complete_group = groups.remove(&group)?;
         drop(groups);
-        complete.sort_by_key(|result| result.point);
-        Some(complete)
+        complete_group.sort_by_key(|result| result.point);
+        Some(complete_group)
     }
 }

@@ -39,7 +39,7 @@ pub struct Estimate {
 
 /// The number of points that a default estimate evaluates. Basis: the lanes of the widest
 /// instruction set. Doubling it doubles the time of an estimate.
-const SAMPLED_POINTS: u64 = 8;
+const MAX_SAMPLED_POINTS: u64 = 8;
 
 /// Memory (bytes) of the program, its libraries and buffers without points. Basis: measured in
 /// docs/scaling.md. Doubling it overestimates small runs.
@@ -55,16 +55,17 @@ impl Estimate {
     /// # Errors
     /// A plan that has no engine, or a thread that cannot be started.
     pub fn from_first_rows<M: Model>(plan: &Plan<M>, threads: usize) -> Result<Self, Error> {
-        let points = plan.points().min(SAMPLED_POINTS);
+        let sampled_points = plan.points().min(MAX_SAMPLED_POINTS);
         let engine = M::engine(plan, None)?;
-        let axis_values: Vec<Vec<f64>> = (0..points).map(|point| plan.axis_values(point)).collect();
+        let axis_values: Vec<Vec<f64>> =
+            (0..sampled_points).map(|point| plan.axis_values(point)).collect();
         let interrupt = Interrupt::new();
         let context = RunContext::new(&interrupt);
         let pool = threads::build_pool(1)?;
-        let start = Instant::now();
+        let start_time = Instant::now();
         let results =
             pool.install(|| evaluate_points(engine.evaluator.as_ref(), &axis_values, &context));
-        let core_s_per_point = start.elapsed().as_secs_f64() / points as f64;
+        let core_s_per_point = start_time.elapsed().as_secs_f64() / sampled_points as f64;
         let layout = M::layout(plan);
         let mut sample_statuses = NameCounts::new();
         for row in results.iter().flatten().flat_map(|result| &result.rows) {
@@ -73,7 +74,7 @@ impl Estimate {
             }
         }
         let result_bytes = plan.points() as f64 * layout.bytes_per_row() as f64;
-        let steps = match plan.integrator.steps() {
+        let step_description = match plan.integrator.steps() {
             Steps::Checked(_) => ", until two runs agree",
             Steps::Fixed(_) => ", two trajectories per point",
             Steps::ByError => ": steps as it needs",
@@ -88,7 +89,7 @@ impl Estimate {
             memory_bytes: PROGRAM_BYTES + result_bytes.min(ROW_GROUP_BYTES),
             disk_bytes: result_bytes,
             result_bytes,
-            method: format!("{}{steps}", plan.integrator),
+            method: format!("{}{step_description}", plan.integrator),
             criterion: "",
             notes: Vec::new(),
         })
@@ -98,15 +99,15 @@ impl Estimate {
 /// Formats a size with three digits.
 pub fn format_bytes(bytes: f64) -> String {
     /// The units, each 1000 times the one before.
-    const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
-    let mut scaled = bytes;
-    let mut unit = 0;
-    while scaled >= 999.5 && unit + 1 < UNITS.len() {
-        scaled /= 1e3;
-        unit += 1;
+    const SIZE_UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
+    let mut scaled_size = bytes;
+    let mut unit_index = 0;
+    while scaled_size >= 999.5 && unit_index + 1 < SIZE_UNITS.len() {
+        scaled_size /= 1e3;
+        unit_index += 1;
     }
-    let digits = if unit == 0 || scaled >= 99.95 { 0 } else { 1 };
-    format!("{scaled:.digits$} {}", UNITS[unit])
+    let digits = if unit_index == 0 || scaled_size >= 99.95 { 0 } else { 1 };
+    format!("{scaled_size:.digits$} {}", SIZE_UNITS[unit_index])
 }
 
 #[cfg(test)]
@@ -115,9 +116,9 @@ mod tests {
 
     #[test]
     fn sizes_have_readable_units() {
-        let formatted = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(format_bytes);
+        let formatted_sizes = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(format_bytes);
         assert_eq!(
-            formatted,
+            formatted_sizes,
             ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]
         );
     }

@@ -122,7 +122,7 @@ impl<'a> CachedEvaluator<'a> {
                     let sink = |result: PointRows| {
                         let request = result.point / points_per_request;
                         let Some(results) =
-                            incomplete_requests.add(request, points_per_request, result)
+                            incomplete_requests.add_result(request, points_per_request, result)
                         else {
                             return;
                         };

@@ -52,7 +52,7 @@ impl Exit {
     ];
 
     /// Returns the exit code of a process that a signal has interrupted.
-    pub fn interrupted(signal: Option<u8>) -> Self {
+    pub fn from_signal(signal: Option<u8>) -> Self {
         match signal {
             Some(1) => Self::HungUp,
             Some(15) => Self::Terminated,
@@ -62,9 +62,9 @@ impl Exit {
 
     /// Formats all codes with their meanings for `--help`.
     pub fn format_codes() -> String {
-        let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
-        let outputs = "Results go to standard output, messages to standard error.";
-        format!("{outputs}\n\nExit codes:{}", Self::ALL.map(line).concat())
+        let format_line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
+        let streams_note = "Results go to standard output, messages to standard error.";
+        format!("{streams_note}\n\nExit codes:{}", Self::ALL.map(format_line).concat())
     }
 }
 
@@ -173,17 +173,17 @@ fn is_unsafe(letter: char) -> bool {
 }
 
 /// Returns a text with some characters written as `\u001b`, which is their form in JSON too.
-fn escape(text: &str, is_bad: impl Fn(char) -> bool) -> String {
-    let mut safe = String::with_capacity(text.len());
+fn escape(text: &str, must_escape: impl Fn(char) -> bool) -> String {
+    let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
-        if is_bad(c) {
+        if must_escape(c) {
             // Writing to a String cannot fail.
-            let _ = write!(safe, "\\u{:04x}", u32::from(c));
+            let _ = write!(escaped, "\\u{:04x}", u32::from(c));
         } else {
-            safe.push(c);
+            escaped.push(c);
         }
     }
-    safe
+    escaped
 }
 
 /// Writes a text, for people or as JSON, to standard output. Control characters that come from
@@ -254,14 +254,14 @@ mod tests {
 
     #[test]
     fn unreadable_files_are_bad_input_but_failing_disks_are_not() {
-        let io = |action, kind: io::ErrorKind| {
+        let io_exit_code = |action, kind: io::ErrorKind| {
             let path = PathBuf::from("x.parquet");
             let source = kind.into();
             Error::from(FileError::Io { action, path, source }).exit_code()
         };
-        assert_eq!(io("open", io::ErrorKind::NotFound), Exit::BadInput);
-        assert_eq!(io("open", io::ErrorKind::Other), Exit::Failed);
-        assert_eq!(io("write", io::ErrorKind::PermissionDenied), Exit::Failed);
+        assert_eq!(io_exit_code("open", io::ErrorKind::NotFound), Exit::BadInput);
+        assert_eq!(io_exit_code("open", io::ErrorKind::Other), Exit::Failed);
+        assert_eq!(io_exit_code("write", io::ErrorKind::PermissionDenied), Exit::Failed);
         let path = PathBuf::from("x.parquet");
         let error = ResultsError::TemporaryFile { path, reason: "disk full".to_owned() };
         assert_eq!(Error::from(error).exit_code(), Exit::Failed);

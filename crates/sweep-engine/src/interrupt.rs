@@ -104,8 +104,8 @@ impl Interrupt {
 #[cfg(target_os = "linux")]
 fn ignores_hangups() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    let ignored_signals = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = ignored_signals.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     // SIGHUP is signal 1, the lowest bit. Without a mask, the process is taken to ignore it.
     mask.is_none_or(|mask| mask & 1 == 1)
 }

@@ -89,8 +89,9 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
     /// # Errors
     /// An unknown name, with the reason.
     fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
-        let matching = self.parameters().into_iter().find(|parameter| parameter.name == name);
-        matching.ok_or_else(UnknownParameter::in_no_model)
+        let matching_parameter =
+            self.parameters().into_iter().find(|parameter| parameter.name == name);
+        matching_parameter.ok_or_else(UnknownParameter::in_no_model)
     }
 
     /// Writes a parameter's value, which is in its range. The parameter is no edge of the window.

@@ -10,5 +10,5 @@ pub mod file;
 pub mod search;
 pub mod study;
 
-use evolve::{Candidate, Evolution, evolve, find_front};
+use evolve::{Candidate, Evolution, evolve, find_pareto_front};
 pub use study::Study;

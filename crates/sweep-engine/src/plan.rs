@@ -18,7 +18,7 @@ pub const MAX_POINTS: u64 = 1_000_000_000_000;
 pub const MAX_END_S: f64 = 1e6;
 
 /// The range of `ratio_min`: up to 1, the ratio of equal amplitudes.
-pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
+pub const RATIO_MIN_RANGE: Range = Range::Within(0.0, 1.0);
 
 /// The greatest number of steps of a trajectory by a method whose steps are bounded by stability.
 /// Basis: one such point takes an hour or more. Doubling it accepts points of twice that time.
@@ -93,9 +93,9 @@ impl NumberSources {
         sources.dedup();
         let assumption_rules: Vec<&str> =
             sources.extract_if(.., |source| source.starts_with(ASSUMED_PREFIX)).collect();
-        let given_sources = (!sources.is_empty()).then(|| format!("given: {}", sources.join(", ")));
+        let given_text = (!sources.is_empty()).then(|| format!("given: {}", sources.join(", ")));
         let all_sources: Vec<&str> =
-            given_sources.as_deref().into_iter().chain(assumption_rules).collect();
+            given_text.as_deref().into_iter().chain(assumption_rules).collect();
         (!all_sources.is_empty()).then(|| all_sources.join("; "))
     }
 
@@ -229,8 +229,8 @@ impl AxisValues {
     /// # Panics
     /// On an axis without values.
     pub fn extremes(&self) -> [f64; 2] {
-        let ends = [0, self.len() - 1].map(|i| self.value(i));
-        let values = if let Self::List(values) = self { values } else { &ends[..] };
+        let end_values = [0, self.len() - 1].map(|i| self.value(i));
+        let values = if let Self::List(values) = self { values } else { &end_values[..] };
         let least = values.iter().copied().min_by(f64::total_cmp);
         let greatest = values.iter().copied().max_by(f64::total_cmp);
         [least, greatest].map(Option::unwrap_or_default)
@@ -238,10 +238,10 @@ impl AxisValues {
 }
 
 impl<M: Model> Plan<M> {
-    /// The number of axes whose least and greatest values [`Plan::corners`] combines; further axes
-    /// stay at their least value. Basis: these are 2^8 combinations. Each additional axis doubles
-    /// them.
-    const CORNER_AXES: usize = 8;
+    /// The number of axes whose least and greatest values [`Plan::corner_count`] combines; further
+    /// axes stay at their least value. Basis: these are 2^8 combinations. Each additional axis
+    /// doubles them.
+    const MAX_CORNER_AXES: usize = 8;
 
     /// The greatest number of points at which machines are prepared before a run. Basis: the
     /// preparation of that many points takes a second. Doubling it doubles that time.
@@ -258,16 +258,16 @@ impl<M: Model> Plan<M> {
     /// Returns the value of each axis at a point. The first axis of a grid varies slowest.
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
         if let Some(design) = &self.design {
-            let value = |(k, axis): (usize, &Axis<M>)| match design.position(point, k) {
+            let axis_value = |(k, axis): (usize, &Axis<M>)| match design.position(point, k) {
                 Some(fraction) => axis.values.interpolate(fraction),
                 None => axis.values.value(point),
             };
-            return self.axes.iter().enumerate().map(value).collect();
+            return self.axes.iter().enumerate().map(axis_value).collect();
         }
         let mut values = vec![0.0; self.axes.len()];
         let mut remainder = point;
-        for (value, axis) in values.iter_mut().zip(&self.axes).rev() {
-            *value = axis.values.value(remainder % axis.values.len());
+        for (axis_value, axis) in values.iter_mut().zip(&self.axes).rev() {
+            *axis_value = axis.values.value(remainder % axis.values.len());
             remainder /= axis.values.len();
         }
         values
@@ -295,42 +295,42 @@ impl<M: Model> Plan<M> {
     /// Returns the number of corners: the points at which every axis has its least or greatest
     /// value, where conditions that are monotonic along each axis are hardest to meet. The corners
     /// of a list are all of its points. A plan without axes has one.
-    pub fn corners(&self) -> u64 {
+    pub fn corner_count(&self) -> u64 {
         match &self.design {
             Some(Design::List { points, .. }) => *points,
-            _ => 1 << self.axes.len().min(Self::CORNER_AXES),
+            _ => 1 << self.axes.len().min(Self::MAX_CORNER_AXES),
         }
     }
 
     /// Returns the values of the axes at a corner, from 0.
-    pub fn corner(&self, corner: u64) -> Vec<f64> {
+    pub fn corner_values(&self, corner: u64) -> Vec<f64> {
         if matches!(self.design, Some(Design::List { .. })) {
             return self.axis_values(corner);
         }
-        let end = |(k, axis): (usize, &Axis<M>)| {
-            let takes_greatest = k < Self::CORNER_AXES && corner >> k & 1 == 1;
+        let extreme_value = |(k, axis): (usize, &Axis<M>)| {
+            let takes_greatest = k < Self::MAX_CORNER_AXES && corner >> k & 1 == 1;
             axis.values.extremes()[usize::from(takes_greatest)]
         };
-        self.axes.iter().enumerate().map(end).collect()
+        self.axes.iter().enumerate().map(extreme_value).collect()
     }
 
     /// Returns at most `MAX_PREPARED_CORNERS` corners, because a list may have many and a machine's
     /// modes are expensive to compute. Of a longer list, the points at which an axis has its least
     /// or greatest value come first, and the rest are spread evenly.
-    pub fn some_corners(&self) -> Vec<Vec<f64>> {
-        let corners = self.corners();
+    pub fn corners_to_prepare(&self) -> Vec<Vec<f64>> {
+        let corners = self.corner_count();
         if corners <= Self::MAX_PREPARED_CORNERS {
-            return (0..corners).map(|corner| self.corner(corner)).collect();
+            return (0..corners).map(|corner| self.corner_values(corner)).collect();
         }
-        let mut selected = self.extreme_points();
+        let mut selected_corners = self.extreme_points();
         let remaining_count =
-            Self::MAX_PREPARED_CORNERS.saturating_sub(selected.len() as u64).max(1);
-        selected.extend(
+            Self::MAX_PREPARED_CORNERS.saturating_sub(selected_corners.len() as u64).max(1);
+        selected_corners.extend(
             (0..remaining_count)
                 .map(|k| u128::from(k) * u128::from(corners) / u128::from(remaining_count))
                 .map(|corner| corner as u64),
         );
-        selected.iter().map(|corner| self.corner(*corner)).collect()
+        selected_corners.iter().map(|corner| self.corner_values(*corner)).collect()
     }
 
     /// Returns the points of a list at which an axis has its least or greatest value first.
@@ -384,20 +384,20 @@ mod tests {
 
     #[test]
     fn logarithmic_values_have_exact_decades_and_ends() {
-        let log = AxisValues::Log { from: 1e4, to: 1e9, count: 6 };
-        let values: Vec<_> = (0..6).map(|i| log.value(i)).collect();
+        let log_axis = AxisValues::Log { from: 1e4, to: 1e9, count: 6 };
+        let values: Vec<_> = (0..6).map(|i| log_axis.value(i)).collect();
         assert_eq!(values, [1e4, 1e5, 1e6, 1e7, 1e8, 1e9]);
-        let uneven = AxisValues::Log { from: 0.3, to: 7.7, count: 5 };
-        assert_eq!([uneven.value(0), uneven.value(4)], [0.3, 7.7]);
-        let ratio = uneven.value(2) / uneven.value(1);
-        assert!((uneven.value(3) / uneven.value(2) / ratio - 1.0).abs() < 1e-14);
+        let uneven_axis = AxisValues::Log { from: 0.3, to: 7.7, count: 5 };
+        assert_eq!([uneven_axis.value(0), uneven_axis.value(4)], [0.3, 7.7]);
+        let ratio = uneven_axis.value(2) / uneven_axis.value(1);
+        assert!((uneven_axis.value(3) / uneven_axis.value(2) / ratio - 1.0).abs() < 1e-14);
     }
 
     #[test]
     fn an_axis_of_1e12_values_takes_no_memory() {
         let axis = AxisValues::Linear { from: 0.0, to: 1.0, count: 1_000_000_000_000 };
         assert_eq!([axis.value(0), axis.value(999_999_999_999)], [0.0, 1.0]);
-        let middle = axis.value(500_000_000_000);
-        assert!((middle - 0.5).abs() < 1e-11, "{middle}");
+        let middle_value = axis.value(500_000_000_000);
+        assert!((middle_value - 0.5).abs() < 1e-11, "{middle_value}");
     }
 }

@@ -22,8 +22,8 @@ pub enum ProgressMode {
 
 /// A display of progress on stderr, which any thread may update.
 pub struct Progress {
-    display: Mutex<Display>,
-    total: u64,
+    display: Mutex<ProgressDisplay>,
+    total_count: u64,
     /// The plural noun for the units of the total.
     noun: &'static str,
     /// The number of points that were stored at the start. These points count as done, but not in
@@ -33,7 +33,7 @@ pub struct Progress {
 }
 
 /// The form of the display.
-enum Display {
+enum ProgressDisplay {
     Bar(ProgressBar),
     Lines { interval: Duration, next_line_time: Instant },
     Nothing,
@@ -58,16 +58,16 @@ impl Progress {
     ) -> Self {
         let create_line_display = |interval_s| {
             let interval = Duration::from_secs(interval_s);
-            Display::Lines { interval, next_line_time: Instant::now() + interval }
+            ProgressDisplay::Lines { interval, next_line_time: Instant::now() + interval }
         };
         let display = match mode {
-            ProgressMode::None => Display::Nothing,
+            ProgressMode::None => ProgressDisplay::Nothing,
             ProgressMode::Plain => create_line_display(5),
             ProgressMode::Auto if std::io::stderr().is_terminal() => {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
                 bar.enable_steady_tick(Duration::from_millis(125));
-                Display::Bar(bar.with_style(create_style(if total == 0 {
+                ProgressDisplay::Bar(bar.with_style(create_style(if total == 0 {
                     SPINNER_TEMPLATE
                 } else {
                     BAR_TEMPLATE
@@ -77,7 +77,7 @@ impl Progress {
         };
         Self {
             display: Mutex::new(display),
-            total,
+            total_count: total,
             noun,
             stored_points,
             start_time: Instant::now(),
@@ -95,9 +95,9 @@ impl Progress {
     }
 
     fn format_search_line(&self, done: u64, points: u64) -> String {
-        let rate = format_rate(self.rate(points));
+        let rate = format_rate(self.points_per_s(points));
         let points = format!("{}, {rate}", format_count(points as usize, "point"));
-        match (self.total, self.noun) {
+        match (self.total_count, self.noun) {
             (0, _) => points,
             (total, noun) => format!("{done} of {total} {noun}, {points}"),
         }
@@ -108,11 +108,13 @@ impl Progress {
         // A thread does not wait while another one updates the display.
         let Ok(mut display) = self.display.try_lock() else { return };
         match &mut *display {
-            Display::Bar(bar) => {
+            ProgressDisplay::Bar(bar) => {
                 bar.set_position(position);
                 bar.set_message(text());
             }
-            Display::Lines { interval, next_line_time } if Instant::now() >= *next_line_time => {
+            ProgressDisplay::Lines { interval, next_line_time }
+                if Instant::now() >= *next_line_time =>
+            {
                 // A log that cannot be written must not end the run.
                 let _ = writeln!(std::io::stderr(), "{}", text());
                 *next_line_time = Instant::now() + *interval;
@@ -122,14 +124,14 @@ impl Progress {
     }
 
     /// Returns the points per second of this process.
-    fn rate(&self, done: u64) -> f64 {
+    fn points_per_s(&self, done: u64) -> f64 {
         done.saturating_sub(self.stored_points) as f64
             / self.start_time.elapsed().as_secs_f64().max(1e-9)
     }
 
     /// Shows in the bar that the chunks are being joined.
     pub fn show_joining(&self) {
-        if let Display::Bar(bar) = &*lock(&self.display) {
+        if let ProgressDisplay::Bar(bar) = &*lock(&self.display) {
             bar.set_style(create_style("{spinner} joining {human_len} points"));
             bar.tick();
         }
@@ -137,21 +139,21 @@ impl Progress {
 
     /// Removes the bar.
     pub fn finish(&self) {
-        if let Display::Bar(bar) = &*lock(&self.display) {
+        if let ProgressDisplay::Bar(bar) = &*lock(&self.display) {
             bar.finish_and_clear();
         }
     }
 
     fn format_line(&self, done: u64) -> String {
-        let rate = self.rate(done);
-        let percent = 100.0 * done as f64 / self.total.max(1) as f64;
-        let position = format!("{done} of {} points ({percent:.1} %)", self.total);
+        let rate = self.points_per_s(done);
+        let percent = 100.0 * done as f64 / self.total_count.max(1) as f64;
+        let done_text = format!("{done} of {} points ({percent:.1} %)", self.total_count);
         // Before the first point, neither the rate nor the time left can be estimated.
         if rate == 0.0 {
-            return position;
+            return done_text;
         }
-        let remaining_time = format_duration(self.total.saturating_sub(done) as f64 / rate);
-        format!("{position}, {}, {remaining_time} left", format_rate(rate))
+        let remaining_time = format_duration(self.total_count.saturating_sub(done) as f64 / rate);
+        format!("{done_text}, {}, {remaining_time} left", format_rate(rate))
     }
 }
 
@@ -191,12 +193,15 @@ mod tests {
 
     #[test]
     fn durations_have_readable_units() {
-        let formatted: Vec<String> = [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY]
+        let formatted_durations: Vec<String> = [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY]
             .into_iter()
             .map(format_duration)
             .collect();
-        assert_eq!(formatted[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
-        assert!(formatted[5].ends_with("days"));
+        assert_eq!(
+            formatted_durations[..5],
+            ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]
+        );
+        assert!(formatted_durations[5].ends_with("days"));
     }
 
     #[test]
@@ -220,6 +225,6 @@ mod tests {
         progress.start_time = Instant::now() - Duration::from_secs(10);
         let line = progress.format_search_line(7, 200);
         assert!(line.starts_with("7 of 39 speeds, 200 points, "), "{line}");
-        assert!((9.0..=10.0).contains(&progress.rate(200)), "{line}");
+        assert!((9.0..=10.0).contains(&progress.points_per_s(200)), "{line}");
     }
 }

@@ -39,7 +39,7 @@ pub struct RunOptions<'a> {
     /// The number of worker threads (`threads::choose_count`).
     pub threads: usize,
     /// Whether to discard the rows of an earlier run.
-    pub fresh: bool,
+    pub starts_over: bool,
     /// The shard to compute; `None` for the whole run.
     pub shard: Option<ShardRequest>,
     /// The form in which progress is shown.
@@ -47,7 +47,7 @@ pub struct RunOptions<'a> {
     /// Looks up the scheduler's variables.
     pub environment: Environment<'a>,
     /// Shows messages to the user before the work starts.
-    pub tell: &'a dyn Fn(&str),
+    pub show_message: &'a dyn Fn(&str),
 }
 
 /// The outcome of a run without an error.
@@ -93,7 +93,7 @@ pub fn run(
     options: RunOptions<'_>,
     interrupt: &Interrupt,
 ) -> Result<RunReport, StoreError> {
-    let RunOptions { threads, fresh, shard, environment, .. } = options;
+    let RunOptions { threads, starts_over: fresh, shard, environment, .. } = options;
     let mut run =
         match OpenRun::open(output, job, OpenOptions { starts_over: fresh, shard, environment })? {
             OpenOutcome::Finished((file, tally)) => {
@@ -104,14 +104,16 @@ pub fn run(
         };
     let (points, stored_points) = run.count_own_points();
     if let Some(shard) = run.shard() {
-        (options.tell)(&format!("shard {} of {}", shard.index, shard.count));
-        note_idle_shards(job.points, shard.count).iter().for_each(|note| (options.tell)(note));
+        (options.show_message)(&format!("shard {} of {}", shard.index, shard.count));
+        note_idle_shards(job.points, shard.count)
+            .iter()
+            .for_each(|note| (options.show_message)(note));
     }
     for note in run.take_notes() {
-        (options.tell)(&note);
+        (options.show_message)(&note);
     }
     if stored_points > 0 {
-        (options.tell)(&format!("going on: {stored_points} of {points} points are there"));
+        (options.show_message)(&format!("going on: {stored_points} of {points} points are there"));
     }
     let start_time = Instant::now();
     let started_unix_s = provenance::now_unix_s();
@@ -180,7 +182,7 @@ impl Runner<'_> {
         let is_interrupted = || self.interrupt.is_raised();
         let mut remaining_attempts = 2;
         loop {
-            self.compute(run)?;
+            self.compute_missing_chunks(run)?;
             if is_interrupted() || run.shard().is_some() {
                 return Ok(None);
             }
@@ -197,11 +199,11 @@ impl Runner<'_> {
     }
 
     /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
-    fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
+    fn compute_missing_chunks(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::build_pool(self.threads)?;
         let stored_rows = |point| run.find_stored_rows(point);
         let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
-        let (_, start) = run.count_own_points();
+        let (_, stored_point_count) = run.count_own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
         let collector = ChunkCollector::new(self, run, &context, sender);
@@ -224,7 +226,7 @@ impl Runner<'_> {
                     Err(RecvTimeoutError::Timeout) => {}
                     Err(RecvTimeoutError::Disconnected) => return write_result,
                 }
-                self.progress.show(start + context.points_done());
+                self.progress.show(stored_point_count + context.points_done());
             }
         });
         write_result.and(into_content(collection_result))
@@ -235,10 +237,10 @@ impl Runner<'_> {
 /// writer when it is complete.
 struct ChunkCollector<'a> {
     runner: &'a Runner<'a>,
-    run: &'a OpenRun,
+    open_run: &'a OpenRun,
     context: &'a RunContext<'a>,
     /// The queue of points that have not been evaluated.
-    queue: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
+    point_queue: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
     /// The rows of incomplete chunks, including those that an interrupted process has stored.
     incomplete_chunks: IncompleteGroups,
     writer: SyncSender<(u64, Vec<PointRows>)>,
@@ -252,7 +254,7 @@ impl<'a> ChunkCollector<'a> {
         writer: SyncSender<(u64, Vec<PointRows>)>,
     ) -> Self {
         let incomplete_chunks = run.take_incomplete_chunks();
-        let stored: BTreeSet<u64> =
+        let stored_points: BTreeSet<u64> =
             incomplete_chunks.values().flatten().map(|row| row.point).collect();
         let chunks = run.chunk_count();
         let stride = if runner.engine.shares_work_of_rows { 1 } else { chunk_stride(chunks) };
@@ -260,12 +262,12 @@ impl<'a> ChunkCollector<'a> {
             .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64)
             .filter(|&chunk| run.is_missing(chunk))
             .flat_map(|chunk| run.chunk_range(chunk))
-            .filter(move |point| !stored.contains(point));
+            .filter(move |point| !stored_points.contains(point));
         Self {
             runner,
-            run,
+            open_run: run,
             context,
-            queue: Mutex::new(Box::new(queue)),
+            point_queue: Mutex::new(Box::new(queue)),
             incomplete_chunks: IncompleteGroups(Mutex::new(incomplete_chunks)),
             writer,
         }
@@ -274,33 +276,34 @@ impl<'a> ChunkCollector<'a> {
     /// Has the engine evaluate all missing rows, then writes the rows of incomplete chunks. Returns
     /// the first error.
     fn run(self) -> Result<(), StoreError> {
-        let mut result = self.evaluate();
+        let mut result = self.evaluate_missing_rows();
         let incomplete_chunks = std::mem::take(&mut *lock(&self.incomplete_chunks.0));
         for (chunk, rows) in incomplete_chunks {
             // After an error in one chunk, the others are written all the same.
-            let write_result = self.run.write_chunk(self.runner.job, chunk, rows);
+            let write_result = self.open_run.write_chunk(self.runner.job, chunk, rows);
             result = result.and(write_result);
         }
         result
     }
 
-    fn evaluate(&self) -> Result<(), StoreError> {
+    fn evaluate_missing_rows(&self) -> Result<(), StoreError> {
         let Runner { engine, job, .. } = self.runner;
         let source = || {
-            let point = if self.context.must_stop() { None } else { lock(&self.queue).next() }?;
+            let point =
+                if self.context.must_stop() { None } else { lock(&self.point_queue).next() }?;
             Some((point, (job.axis_values)(point)))
         };
-        let sink = |row| self.collect(row);
-        let evaluate = || engine.evaluator.evaluate(&source, &sink, self.context);
-        let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
+        let sink = |row| self.add_row(row);
+        let run_engine = || engine.evaluator.evaluate(&source, &sink, self.context);
+        let reason = match catch_unwind(AssertUnwindSafe(run_engine)) {
             Err(panic) => format!("the engine panicked: {}", panics::panic_message(panic.as_ref())),
             Ok(()) if self.context.must_stop() => return Ok(()),
             Ok(()) => "the engine ended before it had evaluated all points".to_owned(),
         };
         let incomplete_chunks = lock(&self.incomplete_chunks.0);
         let unfinished_points =
-            incomplete_chunks.keys().next().map(|&chunk| self.run.chunk_range(chunk));
-        let unstarted_points = lock(&self.queue).next().map(|point| point..point + 1);
+            incomplete_chunks.keys().next().map(|&chunk| self.open_run.chunk_range(chunk));
+        let unstarted_points = lock(&self.point_queue).next().map(|point| point..point + 1);
         match unfinished_points.or(unstarted_points) {
             None => Ok(()),
             Some(Range { start: first, end }) => {
@@ -310,11 +313,12 @@ impl<'a> ChunkCollector<'a> {
     }
 
     /// Adds a row to its chunk, and sends the chunk to the writer if it is complete.
-    fn collect(&self, row: PointRows) {
+    fn add_row(&self, row: PointRows) {
         self.context.add_points(1);
-        let chunk = self.run.chunk_of(row.point);
-        let points = self.run.chunk_range(chunk);
-        if let Some(rows) = self.incomplete_chunks.add(chunk, points.end - points.start, row) {
+        let chunk = self.open_run.chunk_of(row.point);
+        let points = self.open_run.chunk_range(chunk);
+        if let Some(rows) = self.incomplete_chunks.add_result(chunk, points.end - points.start, row)
+        {
             // The receiver outlives the engine's work.
             let _ = self.writer.send((chunk, rows));
         }

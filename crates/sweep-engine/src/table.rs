@@ -42,7 +42,7 @@ impl Table {
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
         let array: Float64Array = values.into_iter().collect();
-        self.add(name, unit, description, CellType::Measured, Arc::new(array));
+        self.add_column(name, unit, description, CellType::Measured, Arc::new(array));
     }
 
     /// Adds a column of a parameter's values.
@@ -69,7 +69,7 @@ impl Table {
         values: impl IntoIterator<Item = u64>,
     ) {
         let array = UInt64Array::from_iter_values(values);
-        self.add(name, "1", description, CellType::Count, Arc::new(array));
+        self.add_column(name, "1", description, CellType::Count, Arc::new(array));
     }
 
     /// Adds a column of words, few of which are distinct.
@@ -80,16 +80,23 @@ impl Table {
         values: impl IntoIterator<Item = &'a str>,
     ) {
         let array: DictionaryArray<Int32Type> = values.into_iter().collect();
-        self.add(name, "", description, CellType::Name(Vec::new()), Arc::new(array));
+        self.add_column(name, "", description, CellType::Name(Vec::new()), Arc::new(array));
     }
 
     /// Adds a column of truth values.
     pub fn add_flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
-        self.add(name, "", description, CellType::Flag, Arc::new(array));
+        self.add_column(name, "", description, CellType::Flag, Arc::new(array));
     }
 
-    fn add(&mut self, name: &str, unit: &str, description: &str, kind: CellType, array: ArrayRef) {
+    fn add_column(
+        &mut self,
+        name: &str,
+        unit: &str,
+        description: &str,
+        kind: CellType,
+        array: ArrayRef,
+    ) {
         self.columns.push((DeclaredColumn::new(name, unit, description, kind), array));
     }
 
@@ -128,18 +135,19 @@ impl Table {
         self.add_text(key::NUMERICS, numerics.to_string());
         let properties =
             common_writer_properties(version, self.metadata).set_dictionary_enabled(false).build();
-        let field = |(column, array): (DeclaredColumn, ArrayRef)| {
+        let field_and_array = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();
             let nullable = data_type == DataType::Float64;
             (column.arrow_field(data_type, nullable), array)
         };
-        let (fields, arrays): (Vec<Field>, _) = self.columns.into_iter().map(field).unzip();
+        let (fields, arrays): (Vec<Field>, _) =
+            self.columns.into_iter().map(field_and_array).unzip();
         let schema = Arc::new(Schema::new(fields));
         let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(from_arrow)?;
-        let rows = batch.clone();
+        let batch_to_write = batch.clone();
         let bytes = panics::catch_in_parquet("the library gave up writing", move || {
             let mut writer = Writer::new(Vec::new(), &schema, properties)?;
-            writer.write(&rows)?;
+            writer.write(&batch_to_write)?;
             let mut file = writer.end()?;
             file.append_key_value_metadata(seal::blank_digest());
             file.into_inner()

@@ -111,15 +111,15 @@ mod tests {
 
     #[test]
     fn the_option_comes_before_slurm_and_slurm_before_the_cores() {
-        let slurm =
+        let slurm_environment =
             |cores: &'static str| move |name: &str| (name == SLURM_CORES).then(|| cores.to_owned());
-        assert_eq!(choose_count(None, &slurm("3")).unwrap(), 3);
-        assert_eq!(choose_count(Some(2), &slurm("3")).unwrap(), 2);
+        assert_eq!(choose_count(None, &slurm_environment("3")).unwrap(), 3);
+        assert_eq!(choose_count(Some(2), &slurm_environment("3")).unwrap(), 2);
         assert_eq!(choose_count(None, &|_| None).unwrap(), count_cores());
         for invalid in ["0", "x", "", "4097", "99999999"] {
-            let error = choose_count(None, &slurm(invalid)).unwrap_err().to_string();
+            let error = choose_count(None, &slurm_environment(invalid)).unwrap_err().to_string();
             assert!(error.contains(&format!("SLURM_CPUS_PER_TASK is `{invalid}`")), "{error}");
-            assert_eq!(choose_count(Some(2), &slurm(invalid)).unwrap(), 2);
+            assert_eq!(choose_count(Some(2), &slurm_environment(invalid)).unwrap(), 2);
         }
     }
 }

@@ -3,7 +3,9 @@
 use std::iter::once;
 
 use sweep_engine::RowSink;
-use sweep_engine::columns::{Compared, ComparisonColumns, ResultColumn, declared, pass_rows};
+use sweep_engine::columns::{
+    ComparisonColumns, ResultColumn, RowComparison, into_declarations, pass_rows,
+};
 use sweep_engine::store::{CellType, DeclaredColumn};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Attractor, Channel, Disturbance, GeometryLimit, ModeMotion, StabilityKind};
@@ -40,13 +42,13 @@ impl Columns {
         let criterion = measures.criterion;
         let channel_descriptions = descriptions(channels);
         let comparison = comparison_columns(&channel_descriptions, limits);
-        let mut columns =
-            comparison.amplitudes(criterion.amplitude_description(), criterion.ratio_description());
+        let mut columns = comparison
+            .amplitude_columns(criterion.amplitude_description(), criterion.ratio_description());
         columns.extend(verdict_columns(&comparison));
         columns.extend(gap_columns());
         columns.extend(has_friction.then(friction_column));
         columns.extend(metric_columns(channels, measures));
-        columns.extend(comparison.runs(ROW_STATUSES.to_vec()));
+        columns.extend(comparison.run_columns(ROW_STATUSES.to_vec()));
         Self { columns }
     }
 
@@ -57,7 +59,7 @@ impl Columns {
         let mut columns = growth_columns("");
         let amplitude = "largest deviation from equilibrium over a turn";
         let ratio = "nonlinear over linear amplitude; null where that is zero";
-        columns.extend(comparison.amplitudes(amplitude, ratio));
+        columns.extend(comparison.amplitude_columns(amplitude, ratio));
         // A response has only the verdict's first two columns, those of the greatest ratio.
         columns.extend(verdict_columns(&comparison).into_iter().take(2));
         let text = "ok, or why there is no response";
@@ -68,7 +70,7 @@ impl Columns {
 
     /// Returns the names, units and descriptions of the columns, as a file declares them.
     pub(crate) fn declared(self) -> Vec<DeclaredColumn> {
-        declared(self.columns)
+        into_declarations(self.columns)
     }
 
     /// Passes the rows of a point's outcome to a sink: its own, then those of coexisting outcomes.
@@ -79,19 +81,19 @@ impl Columns {
 }
 
 /// Returns the comparison of both models in an outcome.
-fn compared(outcome: &Outcome) -> Compared<'_> {
+fn compared(outcome: &Outcome) -> RowComparison<'_> {
     let models = [&outcome.nonlinear, &outcome.linear];
-    Compared {
+    RowComparison {
         amplitudes: models.map(|model| model.amplitudes.as_slice()),
         verdict: &outcome.verdict,
-        converged: outcome.converged,
-        sensitive: outcome.sensitive,
-        method: outcome.method as usize,
-        error: outcome.error,
-        status: outcome.status,
+        is_converged: outcome.converged,
+        is_sensitive: outcome.sensitive,
+        method_index: outcome.method as usize,
+        relative_error: outcome.error,
+        status_index: outcome.status,
         fail_time_s: outcome.fail_time_s,
-        steps: models.map(|model| model.steps),
-        rejected: models.map(|model| model.rejected),
+        accepted_steps: models.map(|model| model.steps),
+        rejected_steps: models.map(|model| model.rejected),
     }
 }
 
@@ -100,7 +102,7 @@ fn comparison_columns(
     channels: &[sweep_parameter::Channel],
     limits: RatioLimits,
 ) -> ComparisonColumns<'_, Outcome> {
-    ComparisonColumns { channels, limits, compared }
+    ComparisonColumns { channels, limits, row_comparison: compared }
 }
 
 /// The two models, each with its name and its trajectory in an outcome.
@@ -116,7 +118,7 @@ fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
 fn verdict_columns(comparison: &ComparisonColumns<'_, Outcome>) -> Vec<WasherColumn> {
     let text = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive, dop853_adaptive or dop853";
-    comparison.verdict(MethodKind::ALL.map(MethodKind::name).to_vec(), text)
+    comparison.verdict_columns(MethodKind::ALL.map(MethodKind::name).to_vec(), text)
 }
 
 /// Returns the columns of the metrics that the grid file requests.

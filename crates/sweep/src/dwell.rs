@@ -17,7 +17,7 @@ use washer_row::Status;
 use crate::engine::{CarriedState, find_motions};
 use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
-use sweep_engine::columns::{declared, point_rows};
+use sweep_engine::columns::{into_declarations, point_rows};
 use sweep_engine::store::{DeclaredColumn, PointRows};
 use sweep_engine::{Error, RunContext};
 
@@ -152,7 +152,7 @@ impl AttractorSearch {
 
     /// Returns the declared columns of a result.
     pub(crate) fn columns(&self, plan: &Plan) -> Vec<DeclaredColumn> {
-        declared(self.row_columns(plan))
+        into_declarations(self.row_columns(plan))
     }
 
     fn row_columns(&self, plan: &Plan) -> Vec<DwellColumn> {

@@ -169,7 +169,7 @@ impl<'a> ModelEngine<'a> {
             return ModelKind::ALL.map(|_| RefinementLevels::direct(method));
         }
         // The corners of the grid have the extremes of the machines' frequencies.
-        let corners = self.plan.some_corners();
+        let corners = self.plan.corners_to_prepare();
         let inputs: Vec<PointInput> =
             corners.iter().map(|values| point_input(self.plan, values)).collect();
         let prepared = self.prepare(&inputs);

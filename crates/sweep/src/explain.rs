@@ -20,7 +20,7 @@ use crate::estimate::LONG_WORK_S;
 use crate::map_row::MapRow;
 use crate::plan::{Plan, compared_channels, point_input, prepare_input};
 use crate::speeds::Speeds;
-use sweep_engine::columns::MODELS;
+use sweep_engine::columns::MODEL_NAMES;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{
     Error, Execution, Interrupt, Progress, ProgressMode, format_duration, tell, threads,
@@ -336,7 +336,7 @@ fn evaluate_map_result(plan: &Plan, interrupt: &Interrupt) -> Result<MapResult, 
         limits: plan.reliability.limits,
         status: row.as_ref().map_or("", MapRow::status),
         fail_time_s: row.as_ref().and_then(|row| row.number("fail_time_s")),
-        amplitudes: MODELS.map(amplitudes),
+        amplitudes: MODEL_NAMES.map(amplitudes),
         verdict: row.as_ref().map(MapRow::verdict).unwrap_or_default(),
     })
 }

@@ -246,7 +246,7 @@ fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, E
 /// Whether all corners of these ranges have a possible machine and spin.
 fn is_possible(plan: &Plan, sliders: &[Axis]) -> bool {
     let plan = with_sliders(plan, sliders);
-    plan.some_corners().iter().all(|corner| {
+    plan.corners_to_prepare().iter().all(|corner| {
         let input = point_input(&plan, corner);
         input.machine.violations().is_empty() && input.spin.violations().is_empty()
     })

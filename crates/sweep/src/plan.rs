@@ -164,7 +164,8 @@ mod tests {
             ("unbalance_mass_kg", AxisValues::List(vec![0.3, 0.1, 0.2])),
             ("damping_n_s_per_m", AxisValues::Linear { from: 80.0, to: 60.0, count: 3 }),
         ]);
-        let corners: Vec<_> = (0..plan.corners()).map(|corner| plan.corner(corner)).collect();
+        let corners: Vec<_> =
+            (0..plan.corner_count()).map(|corner| plan.corner_values(corner)).collect();
         assert_eq!(corners, [[0.1, 60.0], [0.3, 60.0], [0.1, 80.0], [0.3, 80.0]].map(Vec::from));
     }
 
@@ -172,7 +173,7 @@ mod tests {
     fn a_plan_without_axes_is_one_point() {
         let plan = plan(&[]);
         assert_eq!(plan.points(), 1);
-        assert_eq!((plan.corners(), plan.corner(0)), (1, Vec::new()));
+        assert_eq!((plan.corner_count(), plan.corner_values(0)), (1, Vec::new()));
         assert_eq!(point_input(&plan, &[]).machine, plan.model.machine);
     }
 
@@ -189,7 +190,7 @@ mod tests {
             |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
         assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
         assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
-        assert_eq!(plan.corners(), 4);
+        assert_eq!(plan.corner_count(), 4);
         assert_eq!(point_input(&plan, &points[7]).machine.unbalance.mass_kg, points[7][0]);
     }
 }

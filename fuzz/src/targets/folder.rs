@@ -129,11 +129,11 @@ fn undisturbed_run() -> &'static UndisturbedRun {
         let run_shard = |shard| {
             let options = RunOptions {
                 threads: 1,
-                fresh: false,
+                starts_over: false,
                 shard,
                 progress: ProgressMode::None,
                 environment: &|_| None,
-                tell: &|_| {},
+                show_message: &|_| {},
             };
             let engine = ModelEngine::new(&plan).expect("there is an engine");
             sweep::run(&engine.into_engine(), &Job::new(&plan), &output, options, &Interrupt::new())

@@ -18,8 +18,8 @@ pub(crate) fn run(bytes: &[u8]) {
     match sweep::load(&files.grid, &[]) {
         Ok(plan) => {
             assert!(plan.points() >= 1);
-            for corner in [0, plan.corners() - 1] {
-                let input = sweep::point_input(&plan, &plan.corner(corner));
+            for corner in [0, plan.corner_count() - 1] {
+                let input = sweep::point_input(&plan, &plan.corner_values(corner));
                 assert_eq!(input.machine.violations(), []);
                 assert_eq!(input.spin.violations(), []);
             }

@@ -66,7 +66,7 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     let task = BoundaryTask::new(&plan, &args.options)?;
     let default_path = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default_path);
-    let file = Output::begin(&output, FileKind::Boundary)?;
+    let output_file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = install_interrupt()?;
     let mut trials = match Trials::open(&output, &task.job(), task.trial_columns(), args.fresh)? {
         OpenOutcome::Open(trials) => trials,
@@ -80,41 +80,42 @@ pub fn run<M: Model>(args: &BoundaryArgs) -> Result<Exit, Error> {
     if stored_points > 0 {
         tell(&format!("going on: {} there", format_count(stored_points as usize, "point")));
     }
-    let start = Instant::now();
+    let start_time = Instant::now();
     let execution = args.execution.with_interrupt(&interrupt);
     let (boundary, trials) = search(&task, Some(trials), execution)?;
     let Some(boundary) = boundary else {
         let stored_points = format_count(trials.map_or(0, |trials| trials.trial_count()), "point");
-        let wall = format_duration(start.elapsed().as_secs_f64());
+        let wall_time = format_duration(start_time.elapsed().as_secs_f64());
         let mut text =
-            format!("{}: interrupted with {stored_points} kept, after {wall}\n", plan.name);
+            format!("{}: interrupted with {stored_points} kept, after {wall_time}\n", plan.name);
         text.line("go on", resume_command());
         tell(text.trim_end());
-        return Ok(Exit::interrupted(interrupt.signal()));
+        return Ok(Exit::from_signal(interrupt.signal()));
     };
-    file.finish(&task.table(&boundary).into_bytes(&output)?)?;
+    output_file.finish(&task.table(&boundary).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let text = format_summary(&task, &boundary, start.elapsed().as_secs_f64());
+    let text = format_summary(&task, &boundary, start_time.elapsed().as_secs_f64());
     Ok(print_summary(text, &output))
 }
 
 /// Lists every column whose limit can be traced, with unit, worse side, limit and description.
 fn list_columns<M: Model>(plan: &Plan<M>) -> String {
     let columns = traceable_columns(plan);
-    let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
-    let row = |(column, _): &(DeclaredColumn, Plan<M>)| {
+    let name_width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
+    let format_row = |(column, _): &(DeclaredColumn, Plan<M>)| {
         let DeclaredColumn { name, metadata, .. } = column;
         let unit = &metadata.unit;
         let worse_side = metadata.worse.map_or("", Worse::name);
         let limit = metadata.limit.map_or_else(|| "--limit".to_owned(), format_number);
         let description = metadata.description.split(';').next().unwrap_or_default();
         format!(
-            "{name:width$}  {unit:>4}  worse the {worse_side:7}  limit {limit:7}  {description}\n"
+            "{name:name_width$}  {unit:>4}  worse the {worse_side:7}  limit \
+             {limit:7}  {description}\n"
         )
     };
-    columns.iter().map(row).collect()
+    columns.iter().map(format_row).collect()
 }
 
 /// Prints a summary, with the file and the command that draws it.
@@ -138,7 +139,7 @@ fn format_summary<M: Model>(
     boundary: &TracedBoundary,
     wall_s: f64,
 ) -> String {
-    let BoundaryTask { plan, quantity, range: search, .. } = task;
+    let BoundaryTask { plan, quantity, range, .. } = task;
     let grid_points: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
         "{}: {} traced with {} (the grid has {grid_points}) in {}, {}\n",
@@ -148,42 +149,43 @@ fn format_summary<M: Model>(
         format_count(boundary.batch_count, "round"),
         format_duration(wall_s)
     );
-    let rows = || boundary.rows_by_curve.iter().flatten();
+    let all_rows = || boundary.rows_by_curve.iter().flatten();
     let count_kind = |row: &BoundaryRow, kind| {
         row.side_changes.iter().filter(|side_change| side_change.kind == kind).count()
     };
     let change_counts = SideChangeKind::ALL.into_iter().filter_map(|kind| {
-        let count: usize = rows().map(|row| count_kind(row, kind)).sum();
+        let count: usize = all_rows().map(|row| count_kind(row, kind)).sum();
         let [noun, qualifier] = noun_and_qualifier(kind);
         (count > 0).then(|| format_count(count, noun) + qualifier)
     });
     text.line("found", change_counts.collect::<Vec<_>>().join(", "));
-    let folded_values = rows().filter(|row| count_kind(row, SideChangeKind::Crossing) > 1).count();
+    let folded_values =
+        all_rows().filter(|row| count_kind(row, SideChangeKind::Crossing) > 1).count();
     if folded_values > 0 {
         let value_count = format_count(folded_values, "value");
         text.line("folds", format!("several crossings at {value_count} of the first axis"));
     }
     let brackets =
-        rows().flat_map(|row| &row.side_changes).filter_map(|side_change| side_change.bracket);
-    let bracket_width = |[low, high]: [f64; 2]| match search.is_second_log {
+        all_rows().flat_map(|row| &row.side_changes).filter_map(|side_change| side_change.bracket);
+    let bracket_width = |[low, high]: [f64; 2]| match range.is_second_log {
         true => (high / low).ln(),
         false => high - low,
     };
     if let Some(widest) = brackets.map(bracket_width).reduce(f64::max) {
-        let unit = match search.is_second_log {
+        let unit = match range.is_second_log {
             true => "of its value",
             false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit),
         };
         let widest = format_number(widest);
-        let tolerance = format_number(search.tolerance);
+        let tolerance = format_number(range.tolerance);
         text.line("brackets", format!("at most {widest} {unit} wide (tolerance: {tolerance})"));
     }
     let cell_sizes = task.max_cell_size().into_iter().zip(&plan.axes);
-    let cell: Vec<String> =
+    let cell_size_text: Vec<String> =
         cell_sizes.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit)).collect();
-    let cell = cell.join(" by ");
+    let cell_size_text = cell_size_text.join(" by ");
     let island_note =
-        format!("of {cell} or more are found; smaller ones may be missed (--lattice)");
+        format!("of {cell_size_text} or more are found; smaller ones may be missed (--lattice)");
     text.line("islands", island_note);
     text
 }
@@ -212,15 +214,15 @@ pub fn search<M: Model>(
     execution: Execution<'_>,
 ) -> Result<(Option<TracedBoundary>, Option<Trials>), Error> {
     let stored_points = trials.as_ref().map_or(0, |trials| trials.trial_count() as u64);
-    let rows = (task.first_values.len() * task.curve_count) as u64;
+    let row_count = (task.first_values.len() * task.curve_count) as u64;
     let rows_done = AtomicU64::new(0);
-    let progress = Progress::for_search(execution.progress, rows, "rows", stored_points);
+    let progress = Progress::for_search(execution.progress, row_count, "rows", stored_points);
     let show_points = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let threads = execution.threads()?;
     let engine = M::engine(&task.plan, task.column_name())?;
     let evaluator =
         CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_points)?;
-    let mut record_rows_done = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
+    let mut record_rows_done = |row_count| rows_done.store(row_count as u64, Ordering::Relaxed);
     let distances = task.distance_evaluator(&evaluator);
     let boundary = trace_boundary(
         &distances,
@@ -241,7 +243,10 @@ mod tests {
     #[test]
     fn a_condition_is_told_as_it_was_typed() {
         assert_eq!(describe_limit("ratio_max", 2.0), "ratio_max = 2");
-        let margin = "margin(ratio_max < 2 and growth_per_s < 0)";
-        assert_eq!(describe_limit(margin, 0.0), "the limit of ratio_max < 2 and growth_per_s < 0");
+        let margin_text = "margin(ratio_max < 2 and growth_per_s < 0)";
+        assert_eq!(
+            describe_limit(margin_text, 0.0),
+            "the limit of ratio_max < 2 and growth_per_s < 0"
+        );
     }
 }

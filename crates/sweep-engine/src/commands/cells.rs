@@ -44,10 +44,10 @@ pub(super) fn without_rounding_noise(value: f64) -> f64 {
     /// Greatest difference, in units of the last place. Basis: a number that follows from others
     /// by some ten operations. Doubling it hides more of the last digit.
     const ROUNDING_ULPS: f64 = 4.0;
-    let noise = ROUNDING_ULPS * f64::EPSILON * value.abs();
+    let max_noise = ROUNDING_ULPS * f64::EPSILON * value.abs();
     let mut candidates =
         (0..15).filter_map(|digits| format!("{value:.digits$e}").parse::<f64>().ok());
-    let is_near = |candidate: &f64| (candidate - value).abs() <= noise;
+    let is_near = |candidate: &f64| (candidate - value).abs() <= max_noise;
     candidates.find(is_near).unwrap_or(value)
 }
 
@@ -83,17 +83,17 @@ pub fn shorten(text: &str) -> String {
 /// Formats a table with headings. Each column is as wide as its widest cell, and each line begins
 /// with `indent`.
 pub fn format_table(headings: &[String], rows: &[Vec<String>], indent: &str) -> String {
-    let width = |column: usize| {
+    let width_of = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column)).chain(headings.get(column));
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..headings.len()).map(width).collect();
-    let line = |cells: &[String]| {
-        let padded: Vec<String> =
+    let widths: Vec<usize> = (0..headings.len()).map(width_of).collect();
+    let format_line = |cells: &[String]| {
+        let padded_cells: Vec<String> =
             cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:>width$}")).collect();
-        format!("{indent}{}\n", padded.join("  ").trim_end())
+        format!("{indent}{}\n", padded_cells.join("  ").trim_end())
     };
-    std::iter::once(line(headings)).chain(rows.iter().map(|row| line(row))).collect()
+    std::iter::once(format_line(headings)).chain(rows.iter().map(|row| format_line(row))).collect()
 }
 
 #[cfg(test)]
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn rounding_noise_is_not_shown_and_digits_are_kept() {
-        for (value, shown) in [
+        for (value, shown_text) in [
             (43.499_999_999_999_99, "43.5"),
             (23.887_500_000_000_003, "23.8875"),
             (0.1 + 0.2, "0.3"),
@@ -114,7 +114,7 @@ mod tests {
             (0.0, "0"),
             (f64::INFINITY, "inf"),
         ] {
-            assert_eq!(without_rounding_noise(value).to_string(), shown);
+            assert_eq!(without_rounding_noise(value).to_string(), shown_text);
         }
     }
 

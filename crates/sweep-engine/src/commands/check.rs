@@ -42,13 +42,13 @@ pub fn run<M: Model>(args: &CheckArgs) -> Result<Exit, Error> {
 /// Formats the plan and the estimate in a few lines.
 fn format_summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let mut text = String::new();
-    let mut line = |name: &str, value: String| {
+    let mut add_line = |name: &str, value: String| {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{name:<12}{value}");
     };
-    line("name", plan.name.clone());
+    add_line("name", plan.name.clone());
     for (k, axis) in plan.axes.iter().enumerate() {
-        line(if k == 0 { "axes" } else { "" }, describe_axis(axis, plan.design.as_ref()));
+        add_line(if k == 0 { "axes" } else { "" }, describe_axis(axis, plan.design.as_ref()));
     }
     let points = plan.points();
     let points_text = match &plan.design {
@@ -57,32 +57,36 @@ fn format_summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
         None if plan.axes.is_empty() => "1 (no axes)".to_owned(),
         None => points.to_string(),
     };
-    line("points", points_text);
+    add_line("points", points_text);
     let (end_s, [from_s, to_s]) = (plan.end_s, plan.window_s);
-    line("time", format!("0 to {end_s} s, window {from_s} to {to_s} s"));
-    line("method", estimate.method.clone());
+    add_line("time", format!("0 to {end_s} s, window {from_s} to {to_s} s"));
+    add_line("method", estimate.method.clone());
     for (name, note) in &estimate.notes {
-        line(name, note.clone());
+        add_line(name, note.clone());
     }
-    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name).collect();
-    line("channels", channels.join(", "));
+    let channel_names: Vec<_> =
+        plan.reliability.channels.iter().map(|channel| channel.name).collect();
+    add_line("channels", channel_names.join(", "));
     let RatioLimits { upper, lower } = plan.reliability.limits;
     let criterion = estimate.criterion;
     let lower_limit = lower.map_or(String::new(), |lower| format!(" and above {lower}"));
-    line("verdict", format!("reliable where every ratio is below {upper}{lower_limit}{criterion}"));
-    line("output", format!("results/{}.parquet", plan.name));
+    add_line(
+        "verdict",
+        format!("reliable where every ratio is below {upper}{lower_limit}{criterion}"),
+    );
+    add_line("output", format!("results/{}.parquet", plan.name));
     let Estimate { threads, simd, .. } = estimate;
     let threads = format_count(*threads, "thread");
-    line("runs on", format!("{threads}, instruction set {simd}"));
+    add_line("runs on", format!("{threads}, instruction set {simd}"));
     let sampled_points =
         format_count(estimate.sample_statuses.values().sum::<u64>() as usize, "point");
-    line("takes", describe_time(plan, estimate, &sampled_points));
+    add_line("takes", describe_time(plan, estimate, &sampled_points));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(format_bytes);
     let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
-    line("", format!("{memory} of memory; {disk}"));
+    add_line("", format!("{memory} of memory; {disk}"));
     if let Some(failures) = describe_failures(&estimate.sample_statuses) {
-        line("failed", format!("{failures}, of {sampled_points} tried"));
+        add_line("failed", format!("{failures}, of {sampled_points} tried"));
     }
     text
 }
@@ -93,19 +97,21 @@ fn describe_time<M: Model>(plan: &Plan<M>, estimate: &Estimate, sampled_points: 
         whole if whole >= plan.end_s => String::new(),
         sampled_s => {
             let has_fixed_steps = matches!(plan.integrator.steps(), Steps::Fixed(_));
-            let warning = if has_fixed_steps {
+            let step_warning = if has_fixed_steps {
                 ""
             } else {
                 "; as steps follow the motion, it may be far off"
             };
-            format!(", the first {sampled_s} s each{warning}")
+            format!(", the first {sampled_s} s each{step_warning}")
         }
     };
     if have_all_points_failed(estimate) {
         return format!("not known: none of the {sampled_points} tried could be computed");
     }
-    let time = format_duration(estimate.wall_s);
-    format!("about {time}: an estimate, from {sampled_points} integrated just now{sampled_time}")
+    let time_text = format_duration(estimate.wall_s);
+    format!(
+        "about {time_text}: an estimate, from {sampled_points} integrated just now{sampled_time}"
+    )
 }
 
 /// Whether points were sampled, and every one of them failed.
@@ -116,33 +122,33 @@ fn have_all_points_failed(estimate: &Estimate) -> bool {
 
 fn describe_axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
     let name = &axis.parameter.name;
-    let count = format_count(axis.values.len() as usize, "value");
-    let value_count = if design.is_some() { String::new() } else { format!("{count} ") };
+    let count_text = format_count(axis.values.len() as usize, "value");
+    let count_prefix = if design.is_some() { String::new() } else { format!("{count_text} ") };
     match &axis.values {
         AxisValues::Linear { from, to, .. } => {
             format!(
-                "{name}: {value_count}from {}",
+                "{name}: {count_prefix}from {}",
                 format_range([*from, *to], format_without_rounding_error)
             )
         }
         AxisValues::Log { from, to, .. } => {
             format!(
-                "{name}: {value_count}from {}, logarithmic",
+                "{name}: {count_prefix}from {}, logarithmic",
                 format_range([*from, *to], format_without_rounding_error)
             )
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
-            let numbers = shape
+            let shape_numbers = shape
                 .numbers()
                 .map(|(key, number)| format!("{key} {}", format_without_rounding_error(number)));
             let range = format_range([*from, *to], format_number);
-            format!("{name}: {}, {}, from {range}", shape.name(), numbers.join(", "))
+            format!("{name}: {}, {}, from {range}", shape.name(), shape_numbers.join(", "))
         }
         AxisValues::List(values) => {
             let first_values: Vec<_> =
                 values.iter().take(8).copied().map(format_without_rounding_error).collect();
             let ellipsis = if values.len() > first_values.len() { ", ..." } else { "" };
-            format!("{name}: {count}, {}{ellipsis}", first_values.join(", "))
+            format!("{name}: {count_text}, {}{ellipsis}", first_values.join(", "))
         }
     }
 }

@@ -84,10 +84,10 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
     let comparison = compare(&tables[0], &tables[1])?;
-    if let Some([check, needed_files]) =
-        args.fail_on.iter().find_map(|fail_on| fail_on.unmet_need(&comparison, &tables))
+    if let Some([check_name, needed_files]) =
+        args.fail_on.iter().find_map(|fail_on| fail_on.find_unmet_need(&comparison, &tables))
     {
-        return Err(Error::option("--fail-on", check, needed_files));
+        return Err(Error::option("--fail-on", check_name, needed_files));
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
         if !comparison.has_verdicts {
@@ -100,7 +100,7 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
         )?;
     }
     let violations: Vec<String> =
-        args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&comparison)).collect();
+        args.fail_on.iter().filter_map(|fail_on| fail_on.describe_violation(&comparison)).collect();
     let overridden = find_overridden::<M>(&tables, &comparison);
     if args.json {
         show(&format!("{:#}\n", to_json(args, &comparison, &overridden, &violations)))?;
@@ -224,17 +224,18 @@ fn column_table(fail_on: &FailOn, comparison: &Comparison, max_rows: usize) -> O
         let [first, second] = worst.values;
         let change = first.zip(second).map(|(first, second)| second - first);
         let sign = if change > Some(0.0) { "+" } else { "" };
-        let key = comparison.shared_rows[worst.row].key.iter().map(|value| format_number(*value));
+        let key_cells =
+            comparison.shared_rows[worst.row].key.iter().map(|value| format_number(*value));
         let value_cells = [
             format_optional(first),
             format_optional(second),
             format!("{sign}{}", format_optional(change)),
         ];
-        key.chain(value_cells).collect()
+        key_cells.chain(value_cells).collect()
     });
     let rows: Vec<Vec<String>> = rows.collect();
-    let unit = if column.unit.is_empty() { "" } else { ", " };
-    let title = format!("greatest changes of {name}{unit}{}", column.unit);
+    let unit_separator = if column.unit.is_empty() { "" } else { ", " };
+    let title = format!("greatest changes of {name}{unit_separator}{}", column.unit);
     let headings = comparison.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
     let headings = headings.map(str::to_owned).collect();
     (!rows.is_empty()).then_some(TitledTable { title, headings, rows })
@@ -252,29 +253,27 @@ fn summary_lines(
         let ellipsis = if paths.len() > first_paths.len() { ", ..." } else { "" };
         let first_paths = first_paths.join(", ");
         let description = format!(
-            "{first_paths}{ellipsis}: the axis {axis} sets this in both, so that the change \
-             does not \
-             show"
+            "{first_paths}{ellipsis}: the axis {axis} sets this in both, so that the change does \
+             not show"
         );
         lines.push(("overridden", description));
     }
     let [first, second] = comparison.unmatched_rows;
-    let unmatched = match (first, second) {
+    let unmatched_note = match (first, second) {
         (0, 0) => String::new(),
         _ => format!(", {first} only in A, {second} only in B"),
     };
-    lines.push(("rows", format!("{} in both{unmatched}", comparison.shared_rows.len())));
+    lines.push(("rows", format!("{} in both{unmatched_note}", comparison.shared_rows.len())));
     if comparison.is_matched_by_point {
         let description = "rows are matched by point: the axes have tolerances about other \
-                    numbers; \
-                    tables have the values in A";
+                           numbers; tables have the values in A";
         lines.push(("matched", description.to_owned()));
     }
-    for (file, name, value) in &comparison.single_valued_axes {
+    for (file, describe_column, value) in &comparison.single_valued_axes {
         let file_name = ["A", "B"][*file];
         lines.push((
             "axis",
-            format!("{name} = {} in {file_name} alone, left out", format_number(*value)),
+            format!("{describe_column} = {} in {file_name} alone, left out", format_number(*value)),
         ));
     }
     for (names, file_name) in comparison.unmatched_columns.iter().zip(["A", "B"]) {
@@ -283,11 +282,12 @@ fn summary_lines(
         }
     }
     if comparison.has_verdicts {
-        let count = |flip: Flip| comparison.flips(false).filter(|row| row.flip == flip).count();
-        let [lost, gained, defined] = [Flip::Lost, Flip::Gained, Flip::Defined].map(count);
+        let count_flips =
+            |flip: Flip| comparison.flips(false).filter(|row| row.flip == flip).count();
+        let [lost, gained, defined] = [Flip::Lost, Flip::Gained, Flip::Defined].map(count_flips);
         let flips = format!("{lost} lost, {gained} gained, {defined} defined in one file alone");
-        let sensitive = comparison.flips(true).count();
-        lines.push(("verdicts", format!("{flips}; of sensitive rows {sensitive}")));
+        let sensitive_flips = comparison.flips(true).count();
+        lines.push(("verdicts", format!("{flips}; of sensitive rows {sensitive_flips}")));
     }
     if let Some([first, second]) = comparison.over_estimated_rows.filter(|counts| *counts != [0, 0])
     {
@@ -300,14 +300,16 @@ fn summary_lines(
     if let Some(shift) = &comparison.boundary {
         lines.push(("boundary", describe_shift(shift)));
     }
-    let differing = comparison.shared_rows.iter().filter(|row| row.differs).count();
-    let description = match differing {
+    let differing_rows = comparison.shared_rows.iter().filter(|row| row.differs).count();
+    let description = match differing_rows {
         0 => "every shared cell is the same, bit for bit".to_owned(),
-        count => {
-            let name = |column: &ColumnChange| format!("{} ({})", column.name, column.rows);
-            let names: Vec<String> = comparison.changed_columns.iter().take(6).map(name).collect();
+        count_flips => {
+            let describe_column =
+                |column: &ColumnChange| format!("{} ({})", column.name, column.rows);
+            let names: Vec<String> =
+                comparison.changed_columns.iter().take(6).map(describe_column).collect();
             let ellipsis = if comparison.changed_columns.len() > 6 { ", ..." } else { "" };
-            format!("{count} rows, in {}{ellipsis}", names.join(", "))
+            format!("{count_flips} rows, in {}{ellipsis}", names.join(", "))
         }
     };
     lines.push(("differ", description));
@@ -337,9 +339,8 @@ fn describe_shift(shift: &BoundaryShift) -> String {
             let axis_values = axis_values.join(", ");
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
-                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {axis_values}: from \
-                 within {from} \
-                 to within {to}"
+                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {axis_values}: from within \
+                 {from} to within {to}"
             )
         }
         _ => "no crossing in both".to_owned(),

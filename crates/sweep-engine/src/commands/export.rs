@@ -15,7 +15,7 @@ pub struct ExportArgs {
     file: PathBuf,
     /// File to write; its extension selects the format
     #[arg(value_name = "OUT", required_unless_present = "output")]
-    #[arg(help = format!("File to write; its extension {} selects the format", extensions()))]
+    #[arg(help = format!("File to write; its extension {} selects the format", list_extensions()))]
     out: Option<PathBuf>,
 
     /// File to write, as an option instead of the second argument
@@ -38,7 +38,7 @@ impl ExportArgs {
 pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
     let output_path = args.output_path();
     let Some(format) = ExportFormat::from_path(output_path) else {
-        let expected = format!("a name that ends in {}", extensions());
+        let expected = format!("a name that ends in {}", list_extensions());
         return Err(Error::option("OUT", output_path.display(), &expected));
     };
     refuse_unfinished(&args.file)?;
@@ -50,6 +50,6 @@ pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
 }
 
 /// Returns the extensions of all formats in words: `.csv or .xlsx`.
-fn extensions() -> String {
+fn list_extensions() -> String {
     ExportFormat::ALL.map(|format| format!(".{}", format.name())).join(" or ")
 }

@@ -98,15 +98,17 @@ impl ResultArgs {
     /// Returns a command line with these arguments, for the user to copy.
     pub fn command(&self, verb: &str) -> String {
         let grid = &self.grid;
-        let path_text = |path: &PathBuf| path.display().to_string();
+        let format_path = |path: &PathBuf| path.display().to_string();
         let sets = grid.sets().into_iter().map(|set| ("set", set));
         let other_options = grid.at.iter().map(|argument| ("at", argument.clone()));
         let other_options =
             other_options.chain(grid.name.iter().map(|name| ("name", name.clone())));
-        let other_options = other_options.chain(self.out.iter().map(|out| ("out", path_text(out))));
-        let line = format!("{} {verb} {}", program(), quote_for_shell(&path_text(&grid.grid)));
-        sets.chain(other_options).fold(line, |line, (name, value)| {
-            line + &format!(" --{name} {}", quote_for_shell(&value))
+        let other_options =
+            other_options.chain(self.out.iter().map(|out| ("out", format_path(out))));
+        let command_line =
+            format!("{} {verb} {}", program(), quote_for_shell(&format_path(&grid.grid)));
+        sets.chain(other_options).fold(command_line, |command_line, (name, value)| {
+            command_line + &format!(" --{name} {}", quote_for_shell(&value))
         })
     }
 }

@@ -7,7 +7,7 @@ use super::cells::format_table;
 use super::grid::resume_command;
 use super::{Lines as _, format_cell, format_number, install_interrupt};
 use crate::config::section::format_count;
-use crate::optimise::file::{candidates_table, format_model_file, parameters, trial_columns};
+use crate::optimise::file::{candidates_table, format_model_file, parameter_axes, trial_columns};
 use crate::optimise::search::{compute_slacks, search};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{OpenOutcome, Trials};
@@ -57,7 +57,7 @@ there.";
 
 /// The number of candidates at which the summary begins to leave some out. Basis: half of the lines
 /// of a terminal. Doubling it lists twice as many.
-const MAX_LISTED: usize = 12;
+const MAX_LISTED_CANDIDATES: usize = 12;
 
 /// The slack, relative to the limit, up to which a condition is said to bind. Basis: a choice for
 /// the reader of the summary, on which no result depends. Doubling it calls conditions binding that
@@ -72,7 +72,7 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
     let study = Study::<M>::load(&args.study, &args.sets)?;
     let default_path = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default_path);
-    let file = Output::begin(&output, FileKind::Optimise)?;
+    let output_file = Output::begin(&output, FileKind::Optimise)?;
     let model_file_output = claim_model_file(&study, args, &output)?;
     let interrupt = install_interrupt()?;
     let mut trials = match Trials::open(&output, &study.job(), trial_columns(&study), args.fresh)? {
@@ -91,28 +91,28 @@ pub fn run<M: Model>(args: &OptimiseArgs) -> Result<Exit, Error> {
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
-    let start = Instant::now();
+    let start_time = Instant::now();
     let execution = args.execution.with_interrupt(&interrupt);
     let (candidates, trials) = search(&study, Some(trials), execution)?;
-    let wall_s = start.elapsed().as_secs_f64();
+    let wall_s = start_time.elapsed().as_secs_f64();
     let Some(candidates) = candidates else {
-        let wall = format_duration(wall_s);
-        let mut text = format!("{}: interrupted after {wall}\n", study.name);
+        let wall_time = format_duration(wall_s);
+        let mut text = format!("{}: interrupted after {wall_time}\n", study.name);
         text.line("go on", resume_command());
         tell(text.trim_end());
-        return Ok(Exit::interrupted(interrupt.signal()));
+        return Ok(Exit::from_signal(interrupt.signal()));
     };
-    file.finish(&candidates_table(&study, &candidates).into_bytes(&output)?)?;
+    output_file.finish(&candidates_table(&study, &candidates).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
     let candidate_count = candidates.len() as u64;
-    let rows = study.rows();
+    let rows_per_candidate = study.rows_per_candidate();
     let search_note = format!(
         "{candidate_count} candidates of {} in {}, {:.0} points/s",
-        format_count(rows as usize, "point"),
+        format_count(rows_per_candidate as usize, "point"),
         format_duration(wall_s),
-        (candidate_count * rows) as f64 / wall_s
+        (candidate_count * rows_per_candidate) as f64 / wall_s
     );
     summarise(
         &study,
@@ -159,27 +159,30 @@ fn describe_slacks(mut known_slacks: Vec<(&str, Slack)>) -> String {
 /// violation is the sum of the excesses over the conditions, each divided by the greatest excess of
 /// all candidates. Returns the candidate's number with the description; `None` if no candidate has
 /// all excesses.
-fn find_nearest<M: Model>(
+fn find_least_violating<M: Model>(
     study: &Study<M>,
     file: &ResultTable,
 ) -> Result<Option<(u64, String)>, Error> {
-    let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let excess_columns: Vec<String> =
+        (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
+    let excess_columns: Vec<&str> = excess_columns.iter().map(String::as_str).collect();
     let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
-    file.file().each_row(&names, |row| {
-        let excesses: Vec<f64> = (0..names.len()).map(|column| row.value(column)).collect();
+    file.file().each_row(&excess_columns, |row| {
+        let excesses: Vec<f64> =
+            (0..excess_columns.len()).map(|column| row.value(column)).collect();
         if excesses.iter().all(|excess| excess.is_finite()) {
             rows.push((row.index(), excesses));
         }
         Ok::<(), Error>(())
     })?;
-    let greatest_excesses: Vec<f64> = (0..names.len())
+    let greatest_excesses: Vec<f64> = (0..excess_columns.len())
         .map(|k| rows.iter().map(|(_, excesses)| excesses[k]).fold(f64::MIN_POSITIVE, f64::max))
         .collect();
-    let violation = |excesses: &[f64]| -> f64 {
+    let relative_violation = |excesses: &[f64]| -> f64 {
         excesses.iter().zip(&greatest_excesses).map(|(excess, greatest)| excess / greatest).sum()
     };
-    let least_violated = rows.iter().min_by(|a, b| violation(&a.1).total_cmp(&violation(&b.1)));
+    let least_violated =
+        rows.iter().min_by(|a, b| relative_violation(&a.1).total_cmp(&relative_violation(&b.1)));
     let Some((candidate, excesses)) = least_violated else { return Ok(None) };
     let mut text = String::new();
     text.line("nearest", format!("candidate {candidate}, which breaks"));
@@ -201,16 +204,16 @@ fn claim_model_file<'a, M: Model>(
     if M::ABOUT.model_file.is_none() {
         return refuse("a model with a file of its own");
     }
-    let candidates = study.evolution.candidates;
+    let candidates = study.evolution.candidate_count;
     if let Some(candidate) = args.candidate.filter(|&candidate| candidate >= candidates) {
         let expected = format!("a number from 0 to {}", candidates - 1);
         return Err(Error::option("--candidate", candidate, expected));
     }
     let model_file_output = Output::begin(path, FileKind::ModelFile)?;
     // The files may not exist yet, so the paths of their folders are compared.
-    let resolved_path =
+    let resolve_path =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
-    if resolved_path(path) == resolved_path(output) {
+    if resolve_path(path) == resolve_path(output) {
         return refuse("another file than that of all candidates");
     }
     Ok(Some((path, model_file_output)))
@@ -229,7 +232,7 @@ fn summarise<M: Model>(
     let mut text = format!("{}: {search_note}\n", study.name);
     let file = ResultTable::open(output)?;
     let optimum = file.file().json(key::OPTIMISE).unwrap_or_default();
-    let parameter_names = parameters(study).iter().map(|axis| &*axis.parameter.name);
+    let parameter_names = parameter_axes(study).iter().map(|axis| &*axis.parameter.name);
     let objective_names = study.objectives.iter().map(|objective| objective.name.as_str());
     let names: Vec<&str> = ["candidate", "feasible", "on_front"]
         .into_iter()
@@ -238,11 +241,11 @@ fn summarise<M: Model>(
         .collect();
     let best = optimum["best"].as_u64();
     let chosen_candidate = candidate.or(best);
-    let nearest = if best.is_none() { find_nearest(study, &file)? } else { None };
-    let mut feasible = 0;
-    let mut front = Vec::new();
-    let mut nearest_cells = None;
-    let mut values = None;
+    let least_violating = if best.is_none() { find_least_violating(study, &file)? } else { None };
+    let mut feasible_count = 0;
+    let mut front_cells = Vec::new();
+    let mut least_violating_cells = None;
+    let mut chosen_values = None;
     // The least value of the first objective before and in the last third of the candidates.
     let mut least_objective = [f64::INFINITY; 2];
     let mut late_front_count = 0;
@@ -250,71 +253,74 @@ fn summarise<M: Model>(
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         if cells[1] == Cell::Flag(true) {
-            feasible += 1;
+            feasible_count += 1;
             let objective = cells.get(3 + study.parameters.len()).and_then(Cell::number);
-            let period_least =
+            let least_in_period =
                 &mut least_objective[usize::from(row.index() >= first_of_last_third)];
-            *period_least = period_least.min(
+            *least_in_period = least_in_period.min(
                 objective.map_or(f64::INFINITY, |objective| study.objectives[0].sign * objective),
             );
         }
         if Some(row.index()) == chosen_candidate {
             let value_cells = cells[3..].iter().take(study.parameters.len());
-            values = value_cells.map(Cell::number).collect::<Option<Vec<f64>>>();
+            chosen_values = value_cells.map(Cell::number).collect::<Option<Vec<f64>>>();
         }
-        if nearest.as_ref().is_some_and(|(candidate, _)| *candidate == row.index()) {
-            nearest_cells = Some(cells.clone());
+        if least_violating.as_ref().is_some_and(|(candidate, _)| *candidate == row.index()) {
+            least_violating_cells = Some(cells.clone());
         }
         if cells[2] == Cell::Flag(true) {
             late_front_count += usize::from(row.index() >= first_of_last_third);
-            front.push(cells);
+            front_cells.push(cells);
         }
         Ok::<(), Error>(())
     })?;
     let candidate_count = file.rows();
     let has_several_objectives = study.objectives.len() > 1;
-    let front_note = match front.len() {
+    let front_note = match front_cells.len() {
         count if has_several_objectives => format!(", {count} on the front"),
         count @ 2.. => format!(", {count} of them equally good"),
         _ => String::new(),
     };
-    text.line("feasible", format!("{feasible} of {candidate_count}{front_note}"));
+    text.line("feasible", format!("{feasible_count} of {candidate_count}{front_note}"));
     if let Some(best) = best {
         text.line("best", format!("candidate {best}"));
     }
-    text.extend(nearest.map(|(_, described)| described));
-    if let Some(values) = values.as_ref().filter(|_| !study.conditions.is_empty()) {
-        text.extend(slack_lines(study, values, execution)?);
+    text.extend(least_violating.map(|(_, described)| described));
+    if let Some(chosen_values) = chosen_values.as_ref().filter(|_| !study.conditions.is_empty()) {
+        text.extend(slack_lines(study, chosen_values, execution)?);
     }
     if least_objective[0].is_finite() && first_of_last_third < candidate_count {
         let Objective { name, sign, .. } = &study.objectives[0];
         let advice = "; more may take it farther";
-        let progress = match [least_objective[0], least_objective[0].min(least_objective[1])]
+        let progress_text = match [least_objective[0], least_objective[0].min(least_objective[1])]
             .map(|value| format_number(sign * value))
         {
             _ if has_several_objectives => {
-                format!("put {late_front_count} of {} on the front{advice}", front.len())
+                format!("put {late_front_count} of {} on the front{advice}", front_cells.len())
             }
             [before, after] if before == after => "found none better".to_owned(),
             [from, to] => format!("took {name} from {from} to {to}{advice}"),
         };
         text.line(
             "search",
-            format!("the last {} candidates {progress}", candidate_count - first_of_last_third),
+            format!(
+                "the last {} candidates {progress_text}",
+                candidate_count - first_of_last_third
+            ),
         );
     }
-    front.sort_by(|a, b| {
+    front_cells.sort_by(|a, b| {
         let first_objective =
             |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
         first_objective(a).unwrap_or(f64::NAN).total_cmp(&first_objective(b).unwrap_or(f64::NAN))
     });
-    let is_at_end = |(searched_parameter, value): &(&SearchedParameter, &f64)| {
+    let is_at_bound = |(searched_parameter, value): &(&SearchedParameter, &f64)| {
         [0.0, 1.0].into_iter().any(|end| searched_parameter.bounds.interpolate(end) == **value)
     };
-    let parameter_values = study.parameters.iter().zip(values.iter().flatten());
+    let parameter_values = study.parameters.iter().zip(chosen_values.iter().flatten());
     let parameters_at_bounds: Vec<&str> = parameter_values
-        .zip(parameters(study))
-        .filter(|(parameter_value, _)| is_at_end(parameter_value))
+        .zip(parameter_axes(study))
+        .filter(|(parameter_value, _)| is_at_bound(parameter_value))
         .map(|(_, axis)| &*axis.parameter.name)
         .collect();
     if !parameters_at_bounds.is_empty() {
@@ -326,22 +332,24 @@ fn summarise<M: Model>(
             ),
         );
     }
-    let listing_interval = front.len().div_ceil(MAX_LISTED).max(1);
+    let listing_interval = front_cells.len().div_ceil(MAX_LISTED_CANDIDATES).max(1);
     let is_best = |cells: &[Cell]| cells[0].number() == optimum["best"].as_f64();
     // The best candidate is always listed, and the nearest one if none is feasible.
-    let listed_candidates = front.iter().enumerate();
+    let listed_candidates = front_cells.iter().enumerate();
     let listed_candidates =
         listed_candidates.filter(|(k, cells)| k % listing_interval == 0 || is_best(cells));
-    let listed_candidates = listed_candidates.map(|(_, cells)| cells).chain(&nearest_cells);
-    let row_texts =
+    let listed_candidates = listed_candidates.map(|(_, cells)| cells).chain(&least_violating_cells);
+    let format_cells =
         |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(format_cell).collect();
     let headings: Vec<String> =
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();
     let listed_candidates: Vec<Vec<String>> =
-        listed_candidates.map(|cells| row_texts(cells)).collect();
+        listed_candidates.map(|cells| format_cells(cells)).collect();
     text.push_str(&format_table(&headings, &listed_candidates, "  "));
     if let Some((path, file)) = model_file_output {
-        let model_file_text = values.as_deref().and_then(|values| format_model_file(study, values));
+        let model_file_text = chosen_values
+            .as_deref()
+            .and_then(|chosen_values| format_model_file(study, chosen_values));
         match chosen_candidate.zip(model_file_text) {
             Some((chosen_candidate, model_file_text)) => {
                 let origin = format!("candidate {chosen_candidate} of {}", study.name);
@@ -357,7 +365,7 @@ fn summarise<M: Model>(
     text.suggest_command("plot", output);
     tell(text.trim_end());
     // An empty front means that no candidate is feasible.
-    Ok(if front.is_empty() { Exit::ConditionViolated } else { Exit::Done })
+    Ok(if front_cells.is_empty() { Exit::ConditionViolated } else { Exit::Done })
 }
 
 #[cfg(test)]
@@ -366,10 +374,12 @@ mod tests {
 
     #[test]
     fn a_condition_far_from_its_limit_does_not_bind() {
-        let far = ("stop <= 50", Slack { distance: 40.0, relative: 0.8 });
-        let near = ("travel <= 0.05", Slack { distance: 1e-4, relative: 2e-3 });
-        assert!(describe_slacks(vec![far, near]).starts_with("     binds  travel"));
-        assert!(describe_slacks(vec![far]).starts_with("   closest  stop"));
+        let far_condition = ("stop <= 50", Slack { distance: 40.0, relative: 0.8 });
+        let near_condition = ("travel <= 0.05", Slack { distance: 1e-4, relative: 2e-3 });
+        assert!(
+            describe_slacks(vec![far_condition, near_condition]).starts_with("     binds  travel")
+        );
+        assert!(describe_slacks(vec![far_condition]).starts_with("   closest  stop"));
         assert_eq!(describe_slacks(Vec::new()), "");
     }
 }

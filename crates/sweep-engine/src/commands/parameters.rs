@@ -26,8 +26,8 @@ pub struct ParametersArgs {
 pub fn run<M: Model>(args: &ParametersArgs) -> Result<Exit, Error> {
     let plan =
         args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
-    let rows = list_parameters(plan.as_ref());
-    show(&if args.json { format_json(&rows) } else { format_text(&rows) })
+    let listed_parameters = list_parameters(plan.as_ref());
+    show(&if args.json { format_json(&listed_parameters) } else { format_text(&listed_parameters) })
 }
 
 /// A line of the listing of parameters.
@@ -60,17 +60,18 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
     parameters.into_iter().map(list_parameter).collect()
 }
 
-fn format_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
+fn format_text<M: Model>(listed_parameters: &[ListedParameter<M>]) -> String {
     let value_text = |row: &ListedParameter<M>| {
         let value_text = row.value.map(|value| without_rounding_noise(value).to_string());
         value_text.unwrap_or_else(|| "-".to_owned())
     };
-    let max_width =
-        |length: &dyn Fn(&ListedParameter<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
+    let max_width = |length: &dyn Fn(&ListedParameter<M>) -> usize| {
+        listed_parameters.iter().map(length).max().unwrap_or(0)
+    };
     let name_width = max_width(&|row| row.parameter.name.len());
     let value_width = max_width(&|row| value_text(row).len());
     let unit_width = max_width(&|row| row.parameter.unit.len());
-    let line = |row: &ListedParameter<M>| {
+    let format_line = |row: &ListedParameter<M>| {
         let name = &row.parameter.name;
         let value_text = value_text(row);
         let unit = row.parameter.unit;
@@ -81,22 +82,22 @@ fn format_text<M: Model>(rows: &[ListedParameter<M>]) -> String {
              [{source}]\n"
         )
     };
-    rows.iter().map(line).collect()
+    listed_parameters.iter().map(format_line).collect()
 }
 
 /// Formats the table as JSON.
-pub fn format_json<M: Model>(rows: &[ListedParameter<M>]) -> String {
-    let row = |row: &ListedParameter<M>| {
+pub fn format_json<M: Model>(listed_parameters: &[ListedParameter<M>]) -> String {
+    let to_json = |to_json: &ListedParameter<M>| {
         json!({
-            "name": row.parameter.name,
-            "value": row.value,
-            "unit": row.parameter.unit,
-            "description": row.parameter.description,
-            "range": range_to_json(row.parameter.range),
-            "source": row.source,
+            "name": to_json.parameter.name,
+            "value": to_json.value,
+            "unit": to_json.parameter.unit,
+            "description": to_json.parameter.description,
+            "range": range_to_json(to_json.parameter.range),
+            "source": to_json.source,
         })
     };
-    format!("{:#}\n", rows.iter().map(row).collect::<Value>())
+    format!("{:#}\n", listed_parameters.iter().map(to_json).collect::<Value>())
 }
 
 /// Returns the bounds of a range as JSON. An end that only the greatest magnitude of all parameters

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::show::ModelSummary;
 use super::{conditions, format_cell, format_number};
-use crate::columns::MODELS;
+use crate::columns::MODEL_NAMES;
 use crate::store::read::{Tally, tally_rows};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, GridInput, Model, Plan, tell};
@@ -58,7 +58,7 @@ pub fn run<M: Model>(
     }
     refuse_unfinished(&args.result)?;
     let file = ResultTable::open(&args.result)?;
-    let page = Output::begin(&output, FileKind::Html)?;
+    let page_output = Output::begin(&output, FileKind::Html)?;
     if file.file().kind() != Some(FileKind::Map) {
         let expected = format!("a {}; other files go behind it", FileKind::Map.name());
         return Err(Error::option("RESULT", args.result.display(), expected));
@@ -74,28 +74,30 @@ pub fn run<M: Model>(
     let limits = ratio_limits(&plan);
     // Rows without a verdict count on neither side, as in share().
     let points_with_verdict = tally.points.saturating_sub(tally.undefined);
-    let share = 100.0 * tally.reliable as f64 / (points_with_verdict as f64).max(1.0);
+    let reliable_percent = 100.0 * tally.reliable as f64 / (points_with_verdict as f64).max(1.0);
     let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
-    let range = limits.map_or_else(String::new, describe_range);
+    let range_text = limits.map_or_else(String::new, describe_range);
     let describe_over_estimates = |limits: RatioLimits| {
-        let below = format_number(limits.over_estimate());
-        format!(" At {over_estimated}, the linear model over-estimates: a ratio is below {below}.")
+        let limit_text = format_number(limits.over_estimate());
+        format!(
+            " At {over_estimated}, the linear model over-estimates: a ratio is below {limit_text}."
+        )
     };
     let over_estimate_note =
         limits.filter(|_| *over_estimated > 0).map_or_else(String::new, describe_over_estimates);
     body += &format!(
-        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {points_with_verdict} points with a \
-         verdict are reliable: every ratio of the nonlinear model to the linear one is {range}. Of \
-         all {points} points, {sensitive} are chaotic, and {undefined} have no \
+        "<p class=\"share\">{reliable_percent:.1} %</p>\n<p>{reliable} of {points_with_verdict} \
+         points with a verdict are reliable: every ratio of the nonlinear model to the linear one \
+         is {range_text}. Of all {points} points, {sensitive} are chaotic, and {undefined} have no \
          verdict.{over_estimate_note}</p>\n"
     );
     let headings = ["", "worst", "limit", "at"];
-    body += &html_table("The worst of it", &headings, &worst_values(&file)?);
-    let mut all_hold = true;
+    body += &html_table("The worst of it", &headings, &worst_value_rows(&file)?);
+    let mut do_all_hold = true;
     let mut requirement_rows = Vec::new();
     for condition in &requirements {
         let condition_check = check_condition(&file, condition, None, false, 1)?;
-        all_hold &= condition_check.holds;
+        do_all_hold &= condition_check.holds;
         let aggregate_values: Vec<String> =
             condition_check.aggregate_values.iter().map(format_cell).collect();
         let violating_rows = condition_check.failing_rows + condition_check.undefined_rows;
@@ -103,22 +105,22 @@ pub fn run<M: Model>(
             true => format!("{violating_rows} of {} rows break it", condition_check.rows),
             false => aggregate_values.join(", "),
         };
-        let verdict = if condition_check.holds { "holds" } else { "FAILS" };
+        let verdict_text = if condition_check.holds { "holds" } else { "FAILS" };
         if !condition_check.holds {
             tell(&format!("FAILS  {}: {outcome}", condition_check.expression));
         }
-        requirement_rows.push(vec![condition_check.expression, outcome, verdict.to_owned()]);
+        requirement_rows.push(vec![condition_check.expression, outcome, verdict_text.to_owned()]);
     }
     body += &html_table("What is required", &["", "found", ""], &requirement_rows);
     body += &format!("<figure>{picture}</figure>\n");
     for path in &args.further {
         let further_file = ParquetFile::open(path)?;
         let (picture, _) = describe_as_html(path, model)?;
-        let lines = model_summary.shortened_lines(&further_file)?;
-        let lines: Vec<_> =
-            lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
+        let summary_lines = model_summary.shortened_lines(&further_file)?;
+        let summary_lines: Vec<_> =
+            summary_lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
         let file_stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        body += &html_table(&file_stem, &["", ""], &lines);
+        body += &html_table(&file_stem, &["", ""], &summary_lines);
         body += &format!("<figure>{picture}</figure>\n");
     }
     let loaded_plan = GridInput::<M>::from_plan(name, &plan).load();
@@ -136,16 +138,17 @@ pub fn run<M: Model>(
     body += &description;
     // A result does not have the sources of its numbers.
     body += "<p>Where each number is from: sweep parameters, with the grid file.</p>\n";
-    let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
-    let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
-    let hashes: Vec<String> = hashes.map(|(key, value)| format!("{key} {value}")).collect();
+    let file_hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
+    let file_hashes = file_hashes.filter_map(|key| Some((key, file.file().value(key)?)));
+    let file_hashes: Vec<String> =
+        file_hashes.map(|(key, value)| format!("{key} {value}")).collect();
     let path = escape(&args.result.display().to_string());
-    let hashes = escape(&hashes.join(", "));
+    let file_hashes = escape(&file_hashes.join(", "));
     body += "<details><summary>File and hashes</summary>";
-    body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
-    page.finish(printable_page(&args.question, &body).as_bytes())?;
+    body += &format!("<p>{path}</p><p>{file_hashes}</p></details>\n");
+    page_output.finish(printable_page(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
-    Ok(if all_hold { Exit::Done } else { Exit::ConditionViolated })
+    Ok(if do_all_hold { Exit::Done } else { Exit::ConditionViolated })
 }
 
 /// Returns whether an argument looks like an expression and is not a file.
@@ -166,14 +169,14 @@ fn describe_range(limits: RatioLimits) -> String {
 /// Returns the worst value, its limit and its point for every column that has a worse side, except
 /// the columns of the linear model, and those of numbered elements, whose extremes are in other
 /// columns.
-fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
+fn worst_value_rows(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
     let mut table_rows = Vec::new();
     for column in &file.columns {
         let name = column.name.as_str();
         let is_numbered =
             name.split('_').nth(1).is_some_and(|word| word.chars().all(|c| c.is_ascii_digit()));
-        let is_shown = !is_numbered && name.split('_').all(|word| word != MODELS[1]);
+        let is_shown = !is_numbered && name.split('_').all(|word| word != MODEL_NAMES[1]);
         let Some(worse) = column.metadata.worse.filter(|_| is_shown) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
         let rows = top_rows(file, &columns, None, Some((name, worse)), 1)?;
@@ -192,12 +195,12 @@ fn worst_values(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
 
 /// Formats the values of the axes.
 fn format_axis_values(file: &ResultTable, axis_cells: &[Cell]) -> String {
-    let axis_unit = |name: &str| file.column(name).map_or("", Column::unit);
+    let unit_of_axis = |name: &str| file.column(name).map_or("", Column::unit);
     let axes = file.axes().into_iter().zip(axis_cells);
-    let values = axes.map(|(axis, cell)| {
-        format!("{} {}", name_in_words(axis), join_unit(format_cell(cell), axis_unit(axis)))
+    let value_texts = axes.map(|(axis, cell)| {
+        format!("{} {}", name_in_words(axis), join_unit(format_cell(cell), unit_of_axis(axis)))
     });
-    values.collect::<Vec<_>>().join(", ")
+    value_texts.collect::<Vec<_>>().join(", ")
 }
 
 /// Joins a number and its unit by a space at which no line breaks.

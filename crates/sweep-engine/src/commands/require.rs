@@ -120,11 +120,16 @@ fn is_random(file: &ResultTable) -> bool {
 
 /// Computes Wilson's interval of every share.
 fn share_intervals(condition_check: &ConditionCheck, is_random: bool) -> Vec<Option<[f64; 2]>> {
-    let interval = |(count, rows): (&Option<u64>, &u64)| {
+    let interval_of_share = |(count, rows): (&Option<u64>, &u64)| {
         let share = ShareInterval::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
-    condition_check.share_counts.iter().zip(&condition_check.aggregate_rows).map(interval).collect()
+    condition_check
+        .share_counts
+        .iter()
+        .zip(&condition_check.aggregate_rows)
+        .map(interval_of_share)
+        .collect()
 }
 
 /// Checks each part that an expression joins by `and`, if the expression fails.
@@ -135,14 +140,14 @@ fn check_parts(
     allow_null: bool,
     holds: bool,
 ) -> Result<Vec<ConditionCheck>, Error> {
-    let texts = condition.conjuncts();
-    if holds || texts.len() < 2 {
+    let conjunct_texts = condition.conjuncts();
+    if holds || conjunct_texts.len() < 2 {
         return Ok(Vec::new());
     }
-    let texts: Vec<String> = texts.into_iter().map(str::to_owned).collect();
-    let parts = conditions::parse_conditions("EXPRESSION", &texts, file)?;
-    let checks = parts.iter().map(|part| check_condition(file, part, filter, allow_null, 0));
-    Ok(checks.collect::<Result<Vec<_>, _>>()?)
+    let conjunct_texts: Vec<String> = conjunct_texts.into_iter().map(str::to_owned).collect();
+    let parts = conditions::parse_conditions("EXPRESSION", &conjunct_texts, file)?;
+    let part_checks = parts.iter().map(|part| check_condition(file, part, filter, allow_null, 0));
+    Ok(part_checks.collect::<Result<Vec<_>, _>>()?)
 }
 
 /// Formats the result of an expression and of its parts.
@@ -186,40 +191,46 @@ fn format_condition_check(
             writeln!(text, ": {rows} rows")
         }
         (rows, true) => {
-            let undefined = match (condition_check.undefined_rows, args.allow_null) {
+            let undefined_note = match (condition_check.undefined_rows, args.allow_null) {
                 (0, _) => String::new(),
                 (count, true) => format!(", {count} undefined (null) and let pass"),
                 (count, false) => format!(", {count} undefined (null)"),
             };
-            writeln!(text, ": {} of {rows} rows false{undefined}", condition_check.failing_rows)
+            writeln!(
+                text,
+                ": {} of {rows} rows false{undefined_note}",
+                condition_check.failing_rows
+            )
         }
         (rows, false) => {
-            let values = condition_check.aggregate_values.iter().enumerate();
-            let values = values.map(|(k, cell)| format_with_interval(cell, share_intervals.get(k)));
-            let values: Vec<String> = values.collect();
-            let values = values.join(", ");
+            let value_texts = condition_check.aggregate_values.iter().enumerate();
+            let value_texts =
+                value_texts.map(|(k, cell)| format_with_interval(cell, share_intervals.get(k)));
+            let value_texts: Vec<String> = value_texts.collect();
+            let value_texts = value_texts.join(", ");
             match condition_check.aggregate_rows.iter().min() {
                 Some(&complete_rows) if complete_rows < rows => {
-                    let missing = rows - complete_rows;
+                    let null_rows = rows - complete_rows;
                     let null_note = match args.allow_null {
                         true => "left out",
                         false => "(`status` says why; --allow-null leaves them out)",
                     };
                     writeln!(
                         text,
-                        ": {values} over {complete_rows} of {rows} rows, {missing} null {null_note}"
+                        ": {value_texts} over {complete_rows} of {rows} rows, {null_rows} null \
+                         {null_note}"
                     )
                 }
-                _ => writeln!(text, ": {values} over {rows} rows"),
+                _ => writeln!(text, ": {value_texts} over {rows} rows"),
             }
         }
     };
     let Some(first) = condition_check.violating_rows.first() else { return text };
     let headings: Vec<String> = first.cells.iter().map(|(name, _)| name.clone()).collect();
-    let cells = |violating_row: &sweep_results::ViolatingRow| {
+    let format_cells = |violating_row: &sweep_results::ViolatingRow| {
         violating_row.cells.iter().map(|(_, cell)| format_cell(cell)).collect()
     };
-    let rows: Vec<Vec<String>> = condition_check.violating_rows.iter().map(cells).collect();
+    let rows: Vec<Vec<String>> = condition_check.violating_rows.iter().map(format_cells).collect();
     text.push_str(&format_table(&headings, &rows, "       "));
     let violation_count = condition_check.failing_rows
         + if args.allow_null { 0 } else { condition_check.undefined_rows };

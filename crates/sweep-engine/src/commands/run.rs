@@ -26,7 +26,8 @@ pub struct RunArgs {
     pub control: RunControlArgs,
 }
 
-/// The arguments
+/// The arguments for the work of a run, which do not change its result: threads, progress, shard,
+/// and whether to start over.
 #[derive(Debug, clap::Args)]
 pub struct RunControlArgs {
     /// The threads and the progress.
@@ -50,11 +51,11 @@ impl RunControlArgs {
     fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
             threads: threads::choose_count(self.execution.threads, &threads::read_variable)?,
-            fresh: self.fresh,
+            starts_over: self.fresh,
             shard: self.shard,
             progress: self.execution.progress,
             environment: &threads::read_variable,
-            tell: &tell,
+            show_message: &tell,
         })
     }
 }
@@ -93,8 +94,8 @@ pub fn execute<M: Model>(
     let job = &Job::new(plan);
     let output = &args.target.output(plan);
     let add_result_lines = |text: &mut String, tally: &Tally| {
-        text.push_str(&count_lines(tally, job));
-        text.push_str(&failure_reasons(engine, tally, job));
+        text.push_str(&format_counts(tally, job));
+        text.push_str(&format_failure_reasons(engine, tally, job));
         text.line("file", output.display());
         if matches!(plan.design, Some(Design::Spread { .. })) {
             text.line("share", format_share(tally));
@@ -102,21 +103,21 @@ pub fn execute<M: Model>(
         text.suggest_command("plot", output);
         Ok(())
     };
-    let run = RunCommand {
+    let run_command = RunCommand {
         name: &plan.name,
-        verb: "run",
-        rows: "points",
+        subcommand: "run",
+        row_noun: "points",
         target: &args.target,
         control: &args.control,
-        options: [options, ""],
+        further_options: [options, ""],
     };
-    run.execute(engine, job, output, interrupt, &add_result_lines)
+    run_command.execute(engine, job, output, interrupt, &add_result_lines)
 }
 
 /// Returns the exit code of a run.
 pub fn exit_code(control: &RunControlArgs, report: &RunReport) -> Exit {
     let by_status = match &report.end {
-        RunEnd::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
+        RunEnd::Interrupted { signal, .. } => return Exit::from_signal(Some(*signal)),
         RunEnd::AlreadyFinished(_, tally) | RunEnd::Finished(tally) => &tally.by_status,
         RunEnd::Shard(_, by_status) => by_status,
     };
@@ -134,16 +135,16 @@ pub struct RunCommand<'a> {
     /// The name of the run.
     pub name: &'a str,
     /// The name of the command.
-    pub verb: &'static str,
+    pub subcommand: &'static str,
     /// The plural noun for the rows.
-    pub rows: &'static str,
+    pub row_noun: &'static str,
     /// The grid file and the output of the run.
     pub target: &'a ResultArgs,
     /// The threads, the progress, the shard, and whether to start over.
     pub control: &'a RunControlArgs,
     /// Further arguments for the command lines in the summary: those of this command, and those of
     /// `merge`. Each begins with a space, or is empty.
-    pub options: [&'a str; 2],
+    pub further_options: [&'a str; 2],
 }
 
 /// A function that adds lines about a finished file to the summary: its content, its path, and the
@@ -165,17 +166,23 @@ impl RunCommand<'_> {
     ) -> Result<RunReport, Error> {
         let report = runner::run(engine, job, output, self.control.options()?, interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
-        tell(self.summary(&report, add_result_lines)?.trim_end());
+        tell(self.format_summary(&report, add_result_lines)?.trim_end());
         Ok(report)
     }
 
     /// Returns the summary of the run, at most twelve lines.
-    fn summary(
+    fn format_summary(
         &self,
         report: &RunReport,
         add_result_lines: ResultLines<'_>,
     ) -> Result<String, Error> {
-        let Self { name, rows, target, options: [run_options, merge_options], .. } = self;
+        let Self {
+            name,
+            row_noun: rows,
+            target,
+            further_options: [run_options, merge_options],
+            ..
+        } = self;
         let session = report.session.as_ref();
         let work_text = session.map(describe_work).unwrap_or_default();
         let mut text;
@@ -191,11 +198,11 @@ impl RunCommand<'_> {
             }
             RunEnd::Shard(shard, by_status) => {
                 text = format!("{name}, shard {} of {}: {work_text}\n", shard.index, shard.count);
-                if let Some(failed) = describe_failures(by_status) {
-                    text.line("failed", failed);
+                if let Some(failure_text) = describe_failures(by_status) {
+                    text.line("failed", failure_text);
                 }
-                let merge = target.command("merge") + merge_options;
-                text.line("next", format!("{merge}, when all shards are done"));
+                let merge_command = target.command("merge") + merge_options;
+                text.line("next", format!("{merge_command}, when all shards are done"));
             }
             RunEnd::Interrupted { stored_points, points, .. } => {
                 let wall_time =
@@ -206,7 +213,10 @@ impl RunCommand<'_> {
                 );
                 let shard = session.and_then(|session| session.shard.as_deref());
                 let shard = shard.map(|shard| format!(" --shard {shard}")).unwrap_or_default();
-                text.line("go on", format!("{}{run_options}{shard}", target.command(self.verb)));
+                text.line(
+                    "go on",
+                    format!("{}{run_options}{shard}", target.command(self.subcommand)),
+                );
             }
         }
         Ok(text)
@@ -216,20 +226,20 @@ impl RunCommand<'_> {
 /// Describes the work of this process.
 fn describe_work(session: &Session) -> String {
     let Session { simd, .. } = session;
-    let wall = format_duration(session.wall_s);
-    let rate = format_rate(session.points_per_s);
-    let points = format_count(session.points as usize, "point");
-    let threads = format_count(session.threads, "thread");
-    format!("{points} in {wall}, {rate} on {threads} ({simd})")
+    let wall_time = format_duration(session.wall_s);
+    let rate_text = format_rate(session.points_per_s);
+    let points_text = format_count(session.points as usize, "point");
+    let threads_text = format_count(session.threads, "thread");
+    format!("{points_text} in {wall_time}, {rate_text} on {threads_text} ({simd})")
 }
 
 /// Formats the counts of a result: verdicts, failures, extremes.
-pub fn count_lines(tally: &Tally, job: &Job<'_>) -> String {
-    count_lines_at(tally, job.limits, &|point| format_axis_values(point, job))
+pub fn format_counts(tally: &Tally, job: &Job<'_>) -> String {
+    format_counts_at(tally, job.limits, &|point| format_axis_values(point, job))
 }
 
 /// Formats the reasons why the first points of each status failed, as far as the engine knows them.
-pub fn failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> String {
+pub fn format_failure_reasons(engine: &Engine<'_>, tally: &Tally, job: &Job<'_>) -> String {
     let mut text = String::new();
     for (status, point) in &tally.first_failed {
         if let Some(reason) = (engine.failure_reason)(*point) {
@@ -250,8 +260,8 @@ fn format_axis_values(point: u64, job: &Job<'_>) -> String {
 
 /// Formats values with their names.
 pub(super) fn format_named_values<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> String {
-    let words = values.map(|(axis, value)| format!("{axis} {}", format_number(value)));
-    words.collect::<Vec<_>>().join(", ")
+    let named_values = values.map(|(axis, value)| format!("{axis} {}", format_number(value)));
+    named_values.collect::<Vec<_>>().join(", ")
 }
 
 /// Returns the share of so many rows among those with a verdict, as `share(reliable)` counts it;
@@ -261,7 +271,7 @@ fn verdict_share(rows: u64, tally: &Tally) -> Option<ShareInterval> {
 }
 
 /// Formats a fraction as a percentage.
-fn percent(fraction: f64) -> String {
+fn format_percent(fraction: f64) -> String {
     format!("{:.1}", 100.0 * fraction)
 }
 
@@ -271,7 +281,7 @@ fn format_share(tally: &Tally) -> String {
     match verdict_share(tally.reliable, tally) {
         None => "no point has a verdict".to_owned(),
         Some(ShareInterval { fraction, low, high }) => {
-            let [share, low, high] = [fraction, low, high].map(percent);
+            let [share, low, high] = [fraction, low, high].map(format_percent);
             format!(
                 "{share} % reliable, with 95 % confidence {low} to {high} % for points at random"
             )
@@ -279,42 +289,45 @@ fn format_share(tally: &Tally) -> String {
     }
 }
 
-/// Formats the counts of a result like [`count_lines`]. `axis_values` returns the values of the
+/// Formats the counts of a result like [`format_counts`]. `axis_values` returns the values of the
 /// axes at a point, in words.
-pub fn count_lines_at(
+pub fn format_counts_at(
     tally: &Tally,
     limits: RatioLimits,
     axis_values: &dyn Fn(u64) -> String,
 ) -> String {
     let mut text = String::new();
     let upper = limits.upper;
-    let range = limits.lower.map_or_else(
+    let range_text = limits.lower.map_or_else(
         || format!("below ratio {upper}"),
         |lower| format!("with ratios from {lower} to {upper}"),
     );
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;
     let other_counts = format!("{unreliable} not, {undefined} undefined");
-    let verdicts = match verdict_share(*reliable, tally) {
-        None => format!("{reliable} {range}, {other_counts}: no row has a verdict"),
+    let verdict_text = match verdict_share(*reliable, tally) {
+        None => format!("{reliable} {range_text}, {other_counts}: no row has a verdict"),
         Some(share) => {
-            let uncounted = if *undefined > 0 { ", which the share leaves out" } else { "" };
-            format!("{reliable} ({} %) {range}, {other_counts}{uncounted}", percent(share.fraction))
+            let uncounted_note = if *undefined > 0 { ", which the share leaves out" } else { "" };
+            format!(
+                "{reliable} ({} %) {range_text}, {other_counts}{uncounted_note}",
+                format_percent(share.fraction)
+            )
         }
     };
-    text.line("reliable", verdicts);
-    text.push_str(&undefined_line(tally, axis_values));
+    text.line("reliable", verdict_text);
+    text.push_str(&format_undefined_line(tally, axis_values));
     // An over-estimated row has a ratio, so that it has a verdict.
     if let Some(share) = verdict_share(*over_estimated, tally).filter(|_| *over_estimated > 0) {
-        let below = format_number(limits.over_estimate());
-        let rows = format!("in {over_estimated} ({} %)", percent(share.fraction));
+        let limit_text = format_number(limits.over_estimate());
+        let rows = format!("in {over_estimated} ({} %)", format_percent(share.fraction));
         let row_counts = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
         let description =
-            format!("{row_counts}: the linear model over-estimates, a ratio is below {below}");
+            format!("{row_counts}: the linear model over-estimates, a ratio is below {limit_text}");
         text.line("too high", description);
     }
-    if let Some(failed) = describe_failures(&tally.by_status) {
-        text.line("failed", failed);
+    if let Some(failure_text) = describe_failures(&tally.by_status) {
+        text.line("failed", failure_text);
     }
     if *sensitive > 0 {
         text.line(
@@ -328,20 +341,24 @@ pub fn count_lines_at(
         text.line("converged", description);
     }
     if let Some(greatest) = &tally.greatest_error {
-        let methods: Vec<String> =
+        let method_counts: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
         // Rows of failed models have an infinite error.
-        let error = Some(greatest.value).filter(|error| error.is_finite());
-        let error_note = error.map(|error| format!("at most {error:.1e} left in a row; "));
+        let finite_error = Some(greatest.value).filter(|finite_error| finite_error.is_finite());
+        let error_note =
+            finite_error.map(|finite_error| format!("at most {finite_error:.1e} left in a row; "));
         let error_note = error_note.unwrap_or_default();
-        text.line("error", format!("{error_note}rows by method: {}", methods.join(", ")));
+        text.line("error", format!("{error_note}rows by method: {}", method_counts.join(", ")));
     }
-    let location = |point: u64| match axis_values(point) {
+    let location_text = |point: u64| match axis_values(point) {
         values if values.is_empty() => values,
         values => format!(" at {values}"),
     };
     if let Some(greatest) = &tally.greatest_ratio {
-        text.line("greatest", format!("ratio {:.3}{}", greatest.value, location(greatest.point)));
+        text.line(
+            "greatest",
+            format!("ratio {:.3}{}", greatest.value, location_text(greatest.point)),
+        );
     }
     for ColumnExtreme {
         column,
@@ -352,18 +369,19 @@ pub fn count_lines_at(
     } in &tally.extremes
     {
         let Some(worst) = worst else { continue };
-        let mut words = format!("{column} {}{}", format_number(worst.value), location(worst.point));
+        let mut extreme_text =
+            format!("{column} {}{}", format_number(worst.value), location_text(worst.point));
         if let Some(limit) = limit.filter(|_| *rows_beyond > 0) {
             let rows = format_count(*rows_beyond as usize, "row");
-            words += &format!("; {rows} {} {}", worse.bad_side(), format_number(limit));
+            extreme_text += &format!("; {rows} {} {}", worse.bad_side(), format_number(limit));
         }
-        text.line(worse.extreme(), words);
+        text.line(worse.extreme(), extreme_text);
     }
     text
 }
 
 /// Formats the reason why rows without a failure have no verdict; empty if there are none.
-fn undefined_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
+fn format_undefined_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let Some(first) = tally.first_undefined_without_failure else { return text };
     let rows = format_count(tally.undefined_without_failure as usize, "row");
@@ -381,9 +399,10 @@ fn undefined_line(tally: &Tally, axis_values: &dyn Fn(u64) -> String) -> String 
 
 /// Returns the number of failed rows of each status, in words; `None` if there are none.
 pub(super) fn describe_failures(by_status: &NameCounts) -> Option<String> {
-    let failed = failure_counts(by_status).map(|(status, count)| format!("{count} {status}"));
-    let failed = failed.collect::<Vec<_>>().join(", ");
-    (!failed.is_empty()).then_some(failed)
+    let failure_texts =
+        failure_counts(by_status).map(|(status, count)| format!("{count} {status}"));
+    let failure_texts = failure_texts.collect::<Vec<_>>().join(", ");
+    (!failure_texts.is_empty()).then_some(failure_texts)
 }
 
 #[cfg(test)]
@@ -402,10 +421,10 @@ mod tests {
             over_estimated: 4,
             ..Tally::default()
         };
-        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
-        let line = "reliable  6 (75.0 %) below ratio 2, 2 not, 8 undefined, which the share leaves \
-                    out\n";
-        assert!(summary.contains(line), "{summary}");
+        let summary = format_counts_at(&tally, 2.0.into(), &|_| String::new());
+        let expected_line = "reliable  6 (75.0 %) below ratio 2, 2 not, 8 undefined, which the \
+                             share leaves out\n";
+        assert!(summary.contains(expected_line), "{summary}");
         assert!(summary.contains("too high  in 4 (50.0 %)"), "{summary}");
         let share = format_share(&tally);
         assert!(share.starts_with("75.0 %"), "{share}");
@@ -414,9 +433,9 @@ mod tests {
     #[test]
     fn a_result_without_a_verdict_has_no_share() {
         let tally = Tally { points: 8, undefined: 8, ..Tally::default() };
-        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
-        let line = "reliable  0 below ratio 2, 0 not, 8 undefined: no row has a verdict\n";
-        assert!(summary.contains(line), "{summary}");
+        let summary = format_counts_at(&tally, 2.0.into(), &|_| String::new());
+        let expected_line = "reliable  0 below ratio 2, 0 not, 8 undefined: no row has a verdict\n";
+        assert!(summary.contains(expected_line), "{summary}");
     }
 
     #[test]
@@ -424,13 +443,13 @@ mod tests {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
         let by_method = [("capped_1".to_owned(), 1)].into();
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
-        let summary = count_lines_at(&tally, 2.0.into(), &|_| String::new());
+        let summary = format_counts_at(&tally, 2.0.into(), &|_| String::new());
         assert!(summary.contains("error  rows by method: 1 capped_1"), "{summary}");
     }
 
     #[test]
     fn rows_without_a_ratio_are_explained_by_the_columns() {
-        let summary = |undefined_without_failure, first_undefined_without_failure| {
+        let summary_of = |undefined_without_failure, first_undefined_without_failure| {
             let tally = Tally {
                 points: 3,
                 undefined: 3,
@@ -439,17 +458,17 @@ mod tests {
                 undefined_condition: Some("null where the linear one is zero".to_owned()),
                 ..Tally::default()
             };
-            count_lines_at(&tally, 2.0.into(), &|point| format!("mass_kg {point}"))
+            format_counts_at(&tally, 2.0.into(), &|point| format!("mass_kg {point}"))
         };
-        let sentence = " undefined  2 rows without a failure, the first at mass_kg 1: each ratio \
-                        is null where the linear one is zero\n";
-        assert!(summary(2, Some(1)).contains(sentence), "{}", summary(2, Some(1)));
-        assert!(!summary(0, None).contains("without a failure"), "{}", summary(0, None));
+        let expected_line = " undefined  2 rows without a failure, the first at mass_kg 1: each \
+                             ratio is null where the linear one is zero\n";
+        assert!(summary_of(2, Some(1)).contains(expected_line), "{}", summary_of(2, Some(1)));
+        assert!(!summary_of(0, None).contains("without a failure"), "{}", summary_of(0, None));
     }
 
     #[test]
     fn rows_beyond_the_limit_of_a_marked_column_are_counted() {
-        let summary = |rows_beyond_limit| {
+        let summary_of = |rows_beyond_limit| {
             let worst = Some(Extreme { value: 2.5, point: 0 });
             let column = "speed_off".to_owned();
             let limit = Some(2.0);
@@ -461,25 +480,25 @@ mod tests {
                 worst_value: worst,
             };
             let tally = Tally { extremes: vec![extreme], ..Tally::default() };
-            count_lines_at(&tally, 2.0.into(), &|_| String::new())
+            format_counts_at(&tally, 2.0.into(), &|_| String::new())
         };
-        assert!(summary(0).contains("  greatest  speed_off 2.5\n"), "{}", summary(0));
+        assert!(summary_of(0).contains("  greatest  speed_off 2.5\n"), "{}", summary_of(0));
         assert!(
-            summary(1).contains("  greatest  speed_off 2.5; 1 row above 2\n"),
+            summary_of(1).contains("  greatest  speed_off 2.5; 1 row above 2\n"),
             "{}",
-            summary(1)
+            summary_of(1)
         );
-        assert!(summary(2).contains("; 2 rows above 2\n"), "{}", summary(2));
+        assert!(summary_of(2).contains("; 2 rows above 2\n"), "{}", summary_of(2));
     }
 
     #[test]
     fn the_share_counts_only_points_with_a_verdict() {
-        let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
-        let summary = format_share(&tally(8, 2));
+        let tally_of = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
+        let summary = format_share(&tally_of(8, 2));
         assert!(
             summary.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"),
             "{summary}"
         );
-        assert_eq!(format_share(&tally(0, 0)), "no point has a verdict");
+        assert_eq!(format_share(&tally_of(0, 0)), "no point has a verdict");
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::boundary::describe_limit;
-use super::run::{count_lines_at, format_named_values};
+use super::run::{format_counts_at, format_named_values};
 use super::{
     Lines as _, conditions, format_cell, format_number, format_range, format_table, shorten,
 };
@@ -19,11 +19,11 @@ use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top_rows};
 
 /// The number of rows that are shown without `--top`. Basis: they fit a terminal. Doubling it shows
 /// twice as many.
-const ROWS_SHOWN: u16 = 10;
+const DEFAULT_SHOWN_ROWS: u16 = 10;
 
 /// The maximum number of lines of one name that are shown. Basis: half of the lines of a terminal.
 /// Doubling it shows twice as many.
-const MAX_LISTED: usize = 12;
+const MAX_LINES_PER_NAME: usize = 12;
 
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
@@ -84,9 +84,10 @@ impl ModelSummary<'_> {
     ) -> Result<Vec<(&'static str, String)>, Error> {
         let mut lines = Vec::new();
         for same_name_lines in (self.lines)(file)?.chunk_by(|a, b| a.0 == b.0) {
-            lines.extend(same_name_lines.iter().take(MAX_LISTED).cloned());
-            if same_name_lines.len() > MAX_LISTED {
-                lines.push(("", format!("and {} more", same_name_lines.len() - MAX_LISTED)));
+            lines.extend(same_name_lines.iter().take(MAX_LINES_PER_NAME).cloned());
+            if same_name_lines.len() > MAX_LINES_PER_NAME {
+                lines
+                    .push(("", format!("and {} more", same_name_lines.len() - MAX_LINES_PER_NAME)));
             }
         }
         Ok(lines)
@@ -113,15 +114,15 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
         });
     }
     let parquet_file = ParquetFile::open(&args.file)?;
-    let read_overview = read_overview(&parquet_file)?;
+    let overview = read_overview(&parquet_file)?;
     if args.json {
-        let mut json = to_json(args, &parquet_file, &read_overview)?;
+        let mut json = to_json(args, &parquet_file, &overview)?;
         json["lines"] = json!((model_summary.lines)(&parquet_file)?);
         return show(&format!("{json:#}\n"));
     }
     let mut text = String::new();
     text.line("file", args.file.display());
-    match &read_overview.result {
+    match &overview.result {
         Some(result) => {
             add_provenance(&mut text, result);
             if parquet_file.is_copy() {
@@ -139,7 +140,7 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
                     format_named_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
                 })
             };
-            text.push_str(&count_lines_at(&tally, limits, &axis_values));
+            text.push_str(&format_counts_at(&tally, limits, &axis_values));
         }
         None => {
             text.line("made by", parquet_file.created_by().unwrap_or("unknown"));
@@ -156,8 +157,8 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
     }
     add_columns(
         &mut text,
-        &read_overview,
-        args.all || read_overview.result.is_none(),
+        &overview,
+        args.all || overview.result.is_none(),
         model_summary.is_metric_column,
     );
     show(&text)
@@ -185,20 +186,24 @@ fn show_rows(args: &ShowArgs) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
     let filter = conditions::parse_filter(args.filter.as_ref(), &file)?;
     let columns = shown_columns(args, &file, filter.as_ref());
-    let order = |by| match (args.ascending, args.descending) {
+    let sort_direction = |sort_column| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,
         (_, true) => Worse::Greater,
-        _ => file.column(by).and_then(|column| column.metadata.worse).unwrap_or(Worse::Greater),
+        _ => file
+            .column(sort_column)
+            .and_then(|column| column.metadata.worse)
+            .unwrap_or(Worse::Greater),
     };
-    let by = args.by.as_deref().map(|by| (by, order(by)));
-    let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top_rows(&file, &names, filter.as_ref(), by, count)?;
+    let sort_column =
+        args.by.as_deref().map(|sort_column| (sort_column, sort_direction(sort_column)));
+    let max_rows = usize::from(args.top.unwrap_or(DEFAULT_SHOWN_ROWS));
+    let column_names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let rows = top_rows(&file, &column_names, filter.as_ref(), sort_column, max_rows)?;
     if args.json {
-        let object = |row: &Vec<Cell>| -> Value {
+        let row_to_json = |row: &Vec<Cell>| -> Value {
             columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()
         };
-        return show(&format!("{:#}\n", rows.iter().map(object).collect::<Value>()));
+        return show(&format!("{:#}\n", rows.iter().map(row_to_json).collect::<Value>()));
     }
     let rows: Vec<Vec<String>> =
         rows.iter().map(|row| row.iter().map(format_cell).collect()).collect();
@@ -238,16 +243,16 @@ fn shown_columns(args: &ShowArgs, file: &ResultTable, filter: Option<&Condition>
 
 /// Returns the content of the text as JSON, with the whole plan.
 fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &FileOverview) -> Result<Value, Error> {
-    let column = |column: &ColumnRange| {
-        let counts = || column.word_counts.iter().cloned().collect::<Value>();
+    let column_to_json = |column_to_json: &ColumnRange| {
+        let word_counts = || column_to_json.word_counts.iter().cloned().collect::<Value>();
         json!({
-            "name": column.name,
-            "unit": Some(&column.metadata.unit).filter(|unit| !unit.is_empty()),
-            "worse": column.metadata.worse.map(Worse::name),
-            "nulls": column.null_count,
-            "least": column.range.map(|(least, _)| Cell::Number(least)),
-            "greatest": column.range.map(|(_, greatest)| Cell::Number(greatest)),
-            "counts": (!column.word_counts.is_empty()).then(counts),
+            "name": column_to_json.name,
+            "unit": Some(&column_to_json.metadata.unit).filter(|unit| !unit.is_empty()),
+            "worse": column_to_json.metadata.worse.map(Worse::name),
+            "nulls": column_to_json.null_count,
+            "least": column_to_json.range.map(|(least, _)| Cell::Number(least)),
+            "greatest": column_to_json.range.map(|(_, greatest)| Cell::Number(greatest)),
+            "counts": (!column_to_json.word_counts.is_empty()).then(word_counts),
         })
     };
     let mut json = json!({
@@ -255,7 +260,7 @@ fn to_json(args: &ShowArgs, file: &ParquetFile, overview: &FileOverview) -> Resu
         "rows": overview.row_count,
         "made_by": file.created_by(),
         "is_sealed": file.is_sealed(),
-        "columns": overview.columns.iter().map(column).collect::<Value>(),
+        "columns": overview.columns.iter().map(column_to_json).collect::<Value>(),
         "boundary": file.json(key::BOUNDARY),
         "plan": file.json(key::PLAN),
     });
@@ -316,30 +321,32 @@ fn add_provenance(text: &mut String, result: &ResultFile) {
     for axis in plan_axes(plan) {
         let name = axis["parameter"].as_str().unwrap_or_default();
         // The axes of a list are its columns, whose ranges are listed with the columns.
-        let values = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
-        let values = values.map(format_json_value);
-        let values = values.map_or(String::new(), |values| format!(": {values}"));
-        text.line("axis", format!("{name}{values}"));
+        let values_text = ["range", "values", "distribution"].iter().find_map(|key| axis.get(key));
+        let values_text = values_text.map(format_json_value);
+        let values_text =
+            values_text.map_or(String::new(), |values_text| format!(": {values_text}"));
+        text.line("axis", format!("{name}{values_text}"));
     }
-    if let Some(set) = plan["set"].as_object() {
-        let assignments =
-            set.iter().map(|(name, value)| format!("{name} = {}", format_json_value(value)));
+    if let Some(set_constants) = plan["set"].as_object() {
+        let assignments = set_constants
+            .iter()
+            .map(|(name, value)| format!("{name} = {}", format_json_value(value)));
         text.line("--set", assignments.collect::<Vec<_>>().join(", "));
     }
 }
 
 /// Formats a JSON value on one line, without quotes and brackets.
 fn format_json_value(value: &Value) -> String {
-    let list = |parts: Vec<String>| parts.join(", ");
+    let join_parts = |parts: Vec<String>| parts.join(", ");
     match value {
-        Value::Object(map) => list(
+        Value::Object(map) => join_parts(
             map.iter().map(|(key, value)| format!("{key} {}", format_json_value(value))).collect(),
         ),
         Value::Array(values) if values.len() > 12 => {
-            let first = list(values.iter().take(12).map(format_json_value).collect());
-            format!("{first}, ... ({} values)", values.len())
+            let first_values = join_parts(values.iter().take(12).map(format_json_value).collect());
+            format!("{first_values}, ... ({} values)", values.len())
         }
-        Value::Array(values) => list(values.iter().map(format_json_value).collect()),
+        Value::Array(values) => join_parts(values.iter().map(format_json_value).collect()),
         Value::String(text) => text.clone(),
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), format_number),
         other => other.to_string(),
@@ -352,36 +359,41 @@ fn plan_axes(plan: &Value) -> &[Value] {
 
 /// Adds lines about columns with their units and ranges: all columns, or those of metrics and the
 /// number of others.
-fn add_columns(text: &mut String, file: &FileOverview, all: bool, is_shown: fn(&str) -> bool) {
+fn add_columns(
+    text: &mut String,
+    file: &FileOverview,
+    shows_all: bool,
+    is_shown: fn(&str) -> bool,
+) {
     text.line("rows", file.row_count);
     let shown_columns: Vec<&ColumnRange> =
-        file.columns.iter().filter(|column| all || is_shown(&column.name)).collect();
-    let width = shown_columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
+        file.columns.iter().filter(|column| shows_all || is_shown(&column.name)).collect();
+    let name_width = shown_columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
     for column in &shown_columns {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "    {:width$}  {}", column.name, describe_range(column));
+        let _ = writeln!(text, "    {:name_width$}  {}", column.name, describe_range(column));
     }
-    let others = file.columns.len() - shown_columns.len();
-    if others > 0 {
-        text.line("columns", format!("{others} more, shown by --all"));
+    let hidden_count = file.columns.len() - shown_columns.len();
+    if hidden_count > 0 {
+        text.line("columns", format!("{hidden_count} more, shown by --all"));
     }
 }
 
 fn describe_range(column: &ColumnRange) -> String {
-    let mut parts = Vec::new();
+    let mut description_parts = Vec::new();
     if let Some((least, greatest)) = column.range {
         let range = format_range([least, greatest], format_number);
-        parts.push(match column.metadata.shown_unit() {
+        description_parts.push(match column.metadata.shown_unit() {
             "" => range,
             unit => format!("{range} {unit}"),
         });
     }
     let names = column.word_counts.iter();
-    parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));
+    description_parts.extend(names.map(|(name, count)| format!("{count} {}", shorten(name))));
     if column.null_count > 0 {
-        parts.push(format!("{} null", column.null_count));
+        description_parts.push(format!("{} null", column.null_count));
     }
-    parts.join(", ")
+    description_parts.join(", ")
 }
 
 #[cfg(test)]
@@ -393,7 +405,9 @@ mod tests {
         let spin = serde_json::json!({ "profile": "ramp", "peak": 350.0 });
         assert_eq!(format_json_value(&spin), "peak 350, profile ramp");
         assert_eq!(format_json_value(&serde_json::json!([1, 2.5])), "1, 2.5");
-        let long: Vec<u32> = (0..40).collect();
-        assert!(format_json_value(&serde_json::json!(long)).ends_with("10, 11, ... (40 values)"));
+        let long_list: Vec<u32> = (0..40).collect();
+        assert!(
+            format_json_value(&serde_json::json!(long_list)).ends_with("10, 11, ... (40 values)")
+        );
     }
 }

@@ -53,13 +53,13 @@ fn format_summary(
     [verb, run_options, merge_options]: [&str; 3],
 ) -> String {
     let mut text = String::new();
-    let state = match folder_status.state {
+    let state_text = match folder_status.state {
         RunStage::NotStarted => "not started",
         RunStage::Unfinished => "unfinished",
         RunStage::Complete => "complete, to be merged",
         RunStage::Finished => "finished",
     };
-    text.line("state", state);
+    text.line("state", state_text);
     text.line("file", folder_status.output.display());
     text.line(
         "points",
@@ -75,32 +75,35 @@ fn format_summary(
         0 => String::new(),
         count => format!(" ({count} of them damaged)"),
     };
-    let chunks = format!(
+    let chunks_text = format!(
         "{} of {} done, {} missing{damaged_note}",
         folder_status.chunks_done, folder_status.chunks, folder_status.chunks_missing
     );
-    text.line("chunks", &chunks);
+    text.line("chunks", &chunks_text);
     for holder in &folder_status.running {
-        let shard = holder.shard.map(|shard| format!(", shard {shard}")).unwrap_or_default();
-        text.line("running", format!("process {} on {}{shard}", holder.pid, holder.host));
+        let shard_text =
+            holder.shard.map(|shard_text| format!(", shard {shard_text}")).unwrap_or_default();
+        text.line("running", format!("process {} on {}{shard_text}", holder.pid, holder.host));
     }
     if let Some(shards) = folder_status.shards {
         text.line("shards", shards);
-        let missing = format_shard_numbers(folder_status.missing_shard_numbers.iter().copied());
-        if !missing.is_empty() {
-            let run = format!("{}{run_options} --shard I/{shards}", args.target.command(verb));
-            text.line("again", format!("{run}, for I = {missing}"));
+        let missing_shards =
+            format_shard_numbers(folder_status.missing_shard_numbers.iter().copied());
+        if !missing_shards.is_empty() {
+            let run_command =
+                format!("{}{run_options} --shard I/{shards}", args.target.command(verb));
+            text.line("again", format!("{run_command}, for I = {missing_shards}"));
             text.line("on Slurm", format!("sbatch --array={} ...", folder_status.missing_shards));
         }
     }
-    let next = match folder_status.state {
+    let next_command = match folder_status.state {
         RunStage::Complete => args.target.command("merge") + merge_options,
         _ => args.target.command(verb) + run_options,
     };
     if folder_status.running.is_empty()
         && (folder_status.shards.is_none() || folder_status.state == RunStage::Complete)
     {
-        text.line("next", &next);
+        text.line("next", &next_command);
     }
     text
 }

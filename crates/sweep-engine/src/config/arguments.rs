@@ -6,7 +6,7 @@ use sweep_parameter::Range;
 
 use super::section::check_number;
 use super::words::check_words;
-use super::{Located, Location, Report, quote, shorten, unknown_word};
+use super::{Located, Location, Report, quote, shorten, unknown_word_mistake};
 
 /// An argument NAME=VALUE, split into its parts.
 pub struct NamedArgument<'a> {
@@ -70,7 +70,7 @@ impl<'a> NamedArgument<'a> {
     pub fn choice(&self, choices: &[&str]) -> Option<usize> {
         let index = choices.iter().position(|choice| *choice == self.value.value);
         if index.is_none() {
-            self.report.push_with(|_| unknown_word(self.name.value, &self.value, choices));
+            self.report.push_with(|_| unknown_word_mistake(self.name.value, &self.value, choices));
         }
         index
     }

@@ -5,10 +5,10 @@ use sweep_results::nearest_name;
 
 use super::draft::WrittenNumbers;
 use super::list::{self, PointList};
-use super::parameters::{MAX_COMPARED_NAMES, find};
+use super::parameters::{MAX_COMPARED_NAMES, find_parameter};
 use super::report::{Diagnostic, Report};
 use super::section::check_number;
-use super::{Draft, Field, Located, Location, Section, quote, refused_number, shorten};
+use super::{Draft, Field, Located, Location, Section, number_mistake, quote, shorten};
 use crate::Model;
 use crate::design::{DesignRule, DistributionShape, MAX_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
@@ -76,7 +76,7 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
     for section in sections {
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
-        let parameter = name.as_ref().and_then(|name| find(name, draft));
+        let parameter = name.as_ref().and_then(|name| find_parameter(name, draft));
         let swept_parameter =
             parameter.as_ref().map(|parameter| SweptParameter::new(parameter, draft));
         let swept_parameter =
@@ -140,7 +140,7 @@ pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &
         if name.value == list::ID_COLUMN || !column.is_known && is_unlike_parameters(&name, draft) {
             continue;
         }
-        let Some(parameter) = find(&name, draft) else { continue };
+        let Some(parameter) = find_parameter(&name, draft) else { continue };
         let range = parameter.range;
         let mut is_valid = true;
         for (row, &value) in
@@ -152,10 +152,10 @@ pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &
             }
             report.push_with(|sources| {
                 let description = format!("value {} of {}", row + 1, quote(name.value));
-                refused_number(
+                number_mistake(
                     &description,
                     value,
-                    &list.table.locate(sources, column.index, row),
+                    &list.table.locate(sources, column.column_index, row),
                     range,
                 )
             });
@@ -222,7 +222,7 @@ impl<'p> SweptParameter<'p> {
 
     /// Reads `tolerance`: a range about the model's own number, as a distance in the parameter's
     /// unit or in percent of the number.
-    fn tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
+    fn read_tolerance(&self, section: &Section<'_>) -> Field<ToleranceRange> {
         section.text_or_number("tolerance").and_then(|tolerance_text| {
             let report = section.report;
             let location = tolerance_text.location;
@@ -298,14 +298,14 @@ const TOLERANCE_DEVIATIONS: f64 = 3.0;
 
 impl ToleranceRange {
     /// Returns evenly spaced values with both ends.
-    const fn read_values(self, value_count: u64) -> ValuesWithTolerance {
+    const fn spaced_values(self, value_count: u64) -> ValuesWithTolerance {
         let values = AxisValues::Linear { from: self.from, to: self.to, count: value_count };
         ValuesWithTolerance { values, tolerance: Some(self.tolerance) }
     }
 
     /// Returns the shape of a distribution within the tolerance, by its index in [`DISTRIBUTIONS`];
     /// `None` for a uniform one.
-    fn shape(self, kind: usize) -> Option<DistributionShape> {
+    fn distribution_shape(self, kind: usize) -> Option<DistributionShape> {
         match kind {
             0 => Some(DistributionShape::Normal {
                 mean: self.nominal,
@@ -337,7 +337,7 @@ fn read_distribution(
         let field = section.report_if_missing(field, key, is_required.then_some("a number"));
         field.into_located().map(|read_number| read_number.value)
     };
-    let field = swept_parameter.tolerance(&section);
+    let field = swept_parameter.read_tolerance(&section);
     let mut tolerance = None;
     let (shape, bounds) = if let Field::Absent = field {
         // The keys of an unknown kind are unknown, so that the keys of all kinds are read with
@@ -365,7 +365,8 @@ fn read_distribution(
         (shape, bounds)
     } else {
         let misplacement_reason = "`tolerance` gives it, about the machine's own number";
-        section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], misplacement_reason);
+        section
+            .mark_misplaced(&["mean", "sd", "median", "sigma", "from", "to"], misplacement_reason);
         section.finish();
         let range = field.into_located()?.value;
         if kind? == 1 && range.from <= 0.0 {
@@ -377,7 +378,7 @@ fn read_distribution(
             );
         }
         tolerance = Some(range.tolerance);
-        (range.shape(kind?), [range.from, range.to])
+        (range.distribution_shape(kind?), [range.from, range.to])
     };
     let [from, to] = bounds;
     let [from_text, to_text] = bounds.map(decimal);
@@ -427,17 +428,17 @@ fn read_design_values(
     points: u64,
 ) -> Option<Located<ValuesWithTolerance>> {
     let misplacement_reason = "a design spreads its points over `range = { from = ..., to = ... }`";
-    section.misplace(&["values"], misplacement_reason);
-    let tolerance = swept_parameter.tolerance(section);
+    section.mark_misplaced(&["values"], misplacement_reason);
+    let tolerance = swept_parameter.read_tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["range", "distribution"], MISPLACED_BESIDE_TOLERANCE);
-        section.misplace(&["count"], "the number of points belongs in [design], as `points`");
+        section.mark_misplaced(&["range", "distribution"], MISPLACED_BESIDE_TOLERANCE);
+        section.mark_misplaced(&["count"], "the number of points belongs in [design], as `points`");
         let Located { value: range, location } = tolerance.into_located()?;
-        return Some(Located { value: range.read_values(2), location });
+        return Some(Located { value: range.spaced_values(2), location });
     }
     match section.table("distribution", "distribution = { kind, ... }").into_located() {
         Some(distributed) => {
-            section.misplace(&["range"], "the distribution has its own `from` and `to`");
+            section.mark_misplaced(&["range"], "the distribution has its own `from` and `to`");
             read_distribution(distributed.value, swept_parameter, points)
         }
         None => {
@@ -472,9 +473,9 @@ fn read_values(
     swept_parameter: &SweptParameter<'_>,
 ) -> Option<Located<ValuesWithTolerance>> {
     let range = swept_parameter.range;
-    let tolerance = swept_parameter.tolerance(section);
+    let tolerance = swept_parameter.read_tolerance(section);
     if !matches!(tolerance, Field::Absent) {
-        section.misplace(&["values", "range"], MISPLACED_BESIDE_TOLERANCE);
+        section.mark_misplaced(&["values", "range"], MISPLACED_BESIDE_TOLERANCE);
         let expected = "the number of values, both ends included";
         let value_count = section.whole_number("count", &(2..=MAX_POINTS));
         let value_count = section.require(value_count, "count", expected);
@@ -490,7 +491,7 @@ fn read_values(
                 format!("expected at most {max_count}"),
             );
         }
-        return Some(Located { value: range.read_values(value_count), location });
+        return Some(Located { value: range.spaced_values(value_count), location });
     }
     let value_list = section.valid_numbers("values", range);
     let range_section = section.table("range", "range = { from, to, count }");
@@ -567,7 +568,7 @@ pub fn read_range(
         }
         Some(value) => {
             let misplacement_reason = "the number of points belongs in [design], as `points`";
-            section.misplace(&["count"], misplacement_reason);
+            section.mark_misplaced(&["count"], misplacement_reason);
             Some(Located { value, location: location.clone() })
         }
     };

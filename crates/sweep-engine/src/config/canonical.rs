@@ -26,11 +26,11 @@ impl<M: Model> Plan<M> {
             integrator: self.integrator.clone(),
             design: self.design.clone(),
             reliability: self.reliability.clone(),
-            ..Self::blank()
+            ..Self::blank_plan()
         };
         let axes = self.axes.iter().map(|axis| self::axis_to_json(axis, self.design.as_ref()));
         let description = Keys::described(false, |keys| {
-            sections::walk(&mut plan, keys);
+            sections::walk_plan_keys(&mut plan, keys);
             keys.write("axis", axes.collect());
             if !self.set.is_empty() {
                 keys.write("set", self.set.iter().cloned().collect());

@@ -1,6 +1,6 @@
 //! The section `[design]`: points by a rule over the axes' ranges, or listed in a file.
 
-use super::keys::Variants;
+use super::keys::KeyVariants;
 use super::{Field, Form, Key, KeyWalk, Keys};
 use crate::Design;
 use crate::design::DesignRule;
@@ -15,7 +15,7 @@ pub const MAX_SEED: u64 = (1 << 53) - 1;
 const MAX_SOBOL_POINTS: u64 = 1 << 32;
 
 /// Walks over the section. After reading, a list has no points yet.
-pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
+pub fn walk_design(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.walk_table(Key::new("design", ""), |keys| {
         let rule_words = DesignRule::ALL.map(|(_, name, description)| (name, description));
         let words = [&rule_words[..], &[("list", "points as listed")]].concat();
@@ -23,7 +23,7 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
         let current_rule = words.iter().position(|(name, _)| Some(*name) == current_rule);
         let key =
             Key::new("method", "").required("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
-        let variants = Variants { words, default: None, settable_count: 0 };
+        let variants = KeyVariants { words, default_index: None, settable_count: 0 };
         let selected_rule = keys.walk_variants(key, &variants, current_rule, |keys, k| {
             match DesignRule::ALL.get(k) {
                 Some((rule, ..)) => walk_spread(*rule, design, keys),
@@ -45,7 +45,7 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
 }
 
 fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
-    keys.misplace(&["points", "seed"], "a list has the points that it lists");
+    keys.mark_misplaced(&["points", "seed"], "a list has the points that it lists");
     let key = Key::new(
         "file",
         "CSV or Parquet, relative to this file: one column a parameter, one row a point",
@@ -64,7 +64,7 @@ fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
 }
 
 fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
-    keys.misplace(&["file"], "only the method \"list\" has it");
+    keys.mark_misplaced(&["file"], "only the method \"list\" has it");
     let points_and_seed = match design {
         Some(Design::Spread { points, seed, .. }) => Some((*points, *seed)),
         Some(Design::List { .. }) | None => None,

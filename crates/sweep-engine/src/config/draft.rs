@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::{Located, Report, written_twice};
+use super::{Located, Report, written_twice_mistake};
 use crate::{Model, ModelParameter, Plan};
 
 /// A plan while it is read; it is valid only if nothing was reported.
@@ -43,7 +43,7 @@ impl WrittenNumbers {
         report: &Report,
     ) -> bool {
         if let Some(first) = parts.iter().find_map(|part| self.0.get(part)) {
-            report.push(written_twice(name, first));
+            report.push(written_twice_mistake(name, first));
             return false;
         }
         let name =

@@ -3,7 +3,7 @@
 use super::arguments::argument_name;
 use super::draft::Draft;
 use super::keys::Options;
-use super::sections::{describe_keys, walk, walk_sections};
+use super::sections::{describe_keys, walk_plan_keys, walk_sections};
 use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse_toml};
 use super::{
@@ -16,7 +16,7 @@ use toml::de::DeTable;
 
 /// Reads the grid file and applies the constants. Returns `None` if the file has no text.
 pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
-    let GridInput { path, text, sets, at_arguments, .. } = input;
+    let GridInput { path, text, set_arguments: sets, at_arguments, .. } = input;
     let path_text = path.display();
     let (text, source) = match text {
         Some(text) => (text.clone(), report.add(path_text.to_string(), text.as_str())),
@@ -36,7 +36,7 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
     let root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref(), report);
 
     let mut keys = Keys::new(KeyWalk::Read(root));
-    let mut draft = Draft { plan: Plan::blank(), report, constants: Vec::new() };
+    let mut draft = Draft { plan: Plan::blank_plan(), report, constants: Vec::new() };
     walk_sections(&mut draft.plan, &mut keys, Some(input));
     let settable_names = describe_keys::<M>().settable_keys;
     let (options, sets): (Vec<&String>, _) = sets
@@ -44,7 +44,7 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
         .partition(|set| set.contains('=') && settable_names.contains(&argument_name(set)));
     parameters::set_constants(keys.section()?, sets, at_arguments, &mut draft);
     draft.plan.reading_notes.columns = read_columns(keys.section()?);
-    let design_field = design::walk(&mut draft.plan.design, &mut keys);
+    let design_field = design::walk_design(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
     match (design_field, draft.plan.design.take()) {
         (_, Some(Design::List { file, .. })) => {
@@ -54,8 +54,8 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
                 Some((parameter.name.into_owned(), parameter.unit.to_owned()))
             };
             let settable_names = list::ColumnNames {
-                known: &find_quantity,
-                renamed: &draft.plan.reading_notes.columns,
+                find_quantity: &find_quantity,
+                renamed_headers: &draft.plan.reading_notes.columns,
             };
             match list::read(&file, path, &settable_names, report) {
                 Some(list) => axes::add_list_axes(root, list, &mut draft),
@@ -68,8 +68,8 @@ pub fn read_draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Opt
     }
     keys.finish();
     let options = Options::read(options, report);
-    walk(&mut draft.plan, &mut Keys::new(KeyWalk::Set(&options)));
-    draft.plan.set.extend(options.changed.into_inner());
+    walk_plan_keys(&mut draft.plan, &mut Keys::new(KeyWalk::Set(&options)));
+    draft.plan.set.extend(options.changes.into_inner());
     Some(draft)
 }
 

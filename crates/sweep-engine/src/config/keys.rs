@@ -7,8 +7,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-use super::section::list_choices;
-use super::{Field, Form, Located, NamedArgument, Report, Section, written_twice};
+use super::section::format_choices;
+use super::{Field, Form, Located, NamedArgument, Report, Section, written_twice_mistake};
 
 /// A key of a table.
 #[derive(Clone, Copy)]
@@ -17,7 +17,7 @@ pub struct Key<'k> {
     /// The description in schemas.
     description: &'k str,
     /// The expected value, if the key is required.
-    expected: Option<&'k str>,
+    expected_value: Option<&'k str>,
     /// Whether `--set` can change the key.
     can_be_set: bool,
 }
@@ -25,13 +25,13 @@ pub struct Key<'k> {
 impl<'k> Key<'k> {
     /// Returns an optional key.
     pub const fn new(name: &'static str, description: &'k str) -> Self {
-        Self { name, description, expected: None, can_be_set: false }
+        Self { name, description, expected_value: None, can_be_set: false }
     }
 
     /// Returns the key as a required one.
     #[must_use]
     pub const fn required(self, expected: &'k str) -> Self {
-        Self { expected: Some(expected), ..self }
+        Self { expected_value: Some(expected), ..self }
     }
 
     /// Returns the key as one that `--set` can change.
@@ -53,9 +53,9 @@ pub enum KeyWalk<'a> {
 
 /// Options of the command line that replace values of a file.
 pub struct Options<'a> {
-    written: Vec<NamedArgument<'a>>,
+    arguments: Vec<NamedArgument<'a>>,
     /// The changes by name.
-    pub changed: RefCell<Vec<(String, Value)>>,
+    pub changes: RefCell<Vec<(String, Value)>>,
     report: &'a Report,
 }
 
@@ -66,24 +66,24 @@ impl<'a> Options<'a> {
         for argument in arguments {
             let Some(next) = NamedArgument::read("--set", argument, report) else { continue };
             match written.iter().find(|earlier| earlier.name.value == next.name.value) {
-                Some(first) => report.push(written_twice(&next.name, &first.name)),
+                Some(first) => report.push(written_twice_mistake(&next.name, &first.name)),
                 None => written.push(next),
             }
         }
-        Self { written, changed: RefCell::default(), report }
+        Self { arguments: written, changes: RefCell::default(), report }
     }
 
     /// Returns the value of an option, and records the change if the value differs from
     /// `old_value`.
     fn value(&self, name: &str, kind: &Form<'_>, old_value: &Value) -> Field<Value> {
-        let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
+        let Some(written) = self.arguments.iter().find(|written| written.name.value == name) else {
             return Field::Absent;
         };
         let Some(value) = kind.read_option(written) else { return Field::Rejected };
         if value != *old_value {
             // The change to a list of words has the text of the argument.
             let change = if value.is_array() { written.value.value.into() } else { value.clone() };
-            self.changed.borrow_mut().push((name.to_owned(), change));
+            self.changes.borrow_mut().push((name.to_owned(), change));
         }
         Field::Present(Located { value, location: written.value.location.clone() })
     }
@@ -94,8 +94,8 @@ impl<'a> Options<'a> {
 pub struct Description {
     is_schema: bool,
     entries: Map<String, Value>,
-    required: Vec<&'static str>,
-    variants: Vec<Value>,
+    required_keys: Vec<&'static str>,
+    variant_schemas: Vec<Value>,
     /// The keys of this table and its inner tables that `--set` can change.
     pub settable_keys: Vec<&'static str>,
 }
@@ -107,7 +107,7 @@ impl Description {
             if !key.description.is_empty() {
                 value["description"] = key.description.into();
             }
-            self.required.extend(key.expected.map(|_| key.name));
+            self.required_keys.extend(key.expected_value.map(|_| key.name));
             self.settable_keys.extend(key.can_be_set.then_some(key.name));
         }
         self.entries.insert(key.name.to_owned(), value);
@@ -136,10 +136,10 @@ impl Description {
 
     /// Returns the table, or its schema.
     pub fn finish(self) -> Value {
-        match (self.is_schema, self.variants.is_empty()) {
+        match (self.is_schema, self.variant_schemas.is_empty()) {
             (false, _) => self.entries.into(),
-            (true, false) => json!({ "oneOf": self.variants }),
-            (true, true) => object_schema(self.entries, &self.required),
+            (true, false) => json!({ "oneOf": self.variant_schemas }),
+            (true, true) => object_schema(self.entries, &self.required_keys),
         }
     }
 }
@@ -207,14 +207,14 @@ impl<'a> Keys<'a> {
     }
 
     /// Rejects keys that belong to another variant, with a reason.
-    pub fn misplace(&self, keys: &[&'static str], reason: &str) {
-        self.section().into_iter().for_each(|section| section.misplace(keys, reason));
+    pub fn mark_misplaced(&self, keys: &[&'static str], reason: &str) {
+        self.section().into_iter().for_each(|section| section.mark_misplaced(keys, reason));
     }
 
     /// Rejects an option that has no place in the plan.
     pub fn refuse(&self, name: &str, title: &str, expected: &str) {
         let KeyWalk::Set(options) = &self.walk else { return };
-        for written in options.written.iter().filter(|written| written.name.value == name) {
+        for written in options.arguments.iter().filter(|written| written.name.value == name) {
             options.report.refuse::<()>(&written.name.location, title, expected);
         }
     }
@@ -240,13 +240,13 @@ impl<'a> Keys<'a> {
                 section.report_if_missing(
                     read_field,
                     key.name,
-                    key.expected.filter(|_| !self.is_lenient),
+                    key.expected_value.filter(|_| !self.is_lenient),
                 )
             }
             KeyWalk::Set(options) if key.can_be_set => options.value(key.name, kind, &old_value),
             KeyWalk::Describe(description) if description.is_schema => {
                 let mut schema = kind.schema();
-                if is_present && key.expected.is_none() {
+                if is_present && key.expected_value.is_none() {
                     schema["default"] = old_value;
                 }
                 description.add(key, schema);
@@ -291,7 +291,7 @@ impl<'a> Keys<'a> {
         };
         match &mut self.walk {
             KeyWalk::Read(root) => root
-                .report_if_missing(root.table(name, &format!("[{name}]")), name, key.expected)
+                .report_if_missing(root.table(name, &format!("[{name}]")), name, key.expected_value)
                 .map(|section| {
                     root.report.record_location(name, section.location);
                     let mut keys_of_table = keys_of_table(KeyWalk::Read(section.value));
@@ -330,7 +330,7 @@ impl<'a> Keys<'a> {
         let value = if description.is_schema {
             let items = description.describe_inner(|keys| walk(keys, 0));
             let mut schema = json!({ "type": "array", "items": items });
-            if key.expected.is_some() {
+            if key.expected_value.is_some() {
                 schema["minItems"] = 1.into();
             }
             schema
@@ -353,7 +353,7 @@ impl<'a> Keys<'a> {
     pub fn walk_variants(
         &mut self,
         key: Key<'_>,
-        variants: &Variants,
+        variants: &KeyVariants,
         current: Option<usize>,
         mut walk: impl FnMut(&mut Self, usize),
     ) -> Option<usize> {
@@ -361,26 +361,29 @@ impl<'a> Keys<'a> {
             && table.is_schema
         {
             for (k, (name, description)) in variants.words.iter().enumerate() {
-                let expected = (variants.default != Some(k)).then_some("");
+                let expected = (variants.default_index != Some(k)).then_some("");
                 let variant = table.describe_inner(|keys| {
                     keys.describe(
-                        Key { description, expected, ..key },
+                        Key { description, expected_value: expected, ..key },
                         |_| json!({ "const": name }),
                     );
                     walk(keys, k);
                 });
-                table.variants.push(variant);
+                table.variant_schemas.push(variant);
             }
             return None;
         }
         let names: Vec<&str> = variants.words.iter().map(|(name, _)| *name).collect();
-        let choices = list_choices(&names);
-        let expected = key.expected.or(variants.default.is_none().then_some(&choices));
+        let choices = format_choices(&names);
+        let expected = key.expected_value.or(variants.default_index.is_none().then_some(&choices));
         let allowed_count =
             if let KeyWalk::Set(_) = self.walk { variants.settable_count } else { names.len() };
         let mut word = current.map(|current| names[current].to_owned());
-        let field =
-            self.walk_key(Key { expected, ..key }, &Form::Word(&names[..allowed_count]), &mut word);
+        let field = self.walk_key(
+            Key { expected_value: expected, ..key },
+            &Form::Word(&names[..allowed_count]),
+            &mut word,
+        );
         if let (KeyWalk::Set(options), Field::Present(field)) = (&self.walk, &field) {
             // The word decides on the whole table, so that its location is that of the table.
             options.report.record_location(
@@ -390,7 +393,7 @@ impl<'a> Keys<'a> {
         }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
         let selected = match (&self.walk, field) {
-            (KeyWalk::Read(_), Field::Absent) => variants.default,
+            (KeyWalk::Read(_), Field::Absent) => variants.default_index,
             (KeyWalk::Read(_), Field::Rejected) => None,
             _ => word,
         };
@@ -405,11 +408,11 @@ impl<'a> Keys<'a> {
 }
 
 /// The words of a key that decides which other keys a table has.
-pub struct Variants {
+pub struct KeyVariants {
     /// The words with their descriptions.
     pub words: Vec<(&'static str, &'static str)>,
     /// The index of the word that applies if a file names none; `None` if it must name one.
-    pub default: Option<usize>,
+    pub default_index: Option<usize>,
     /// The number of words that `--set` may choose, from the first on.
     pub settable_count: usize,
 }

@@ -62,7 +62,7 @@ pub struct NumberTable {
 
 impl NumberTable {
     /// Reads a CSV or Parquet file of numbers; `None` after mistakes, which are reported.
-    pub fn read(path: &Path, names: &ColumnNames<'_>, report: &Report) -> Option<Self> {
+    pub fn read_point_list(path: &Path, names: &ColumnNames<'_>, report: &Report) -> Option<Self> {
         let path_text = shorten_path(path);
         let file = Location::new(report.add(path_text.as_str(), String::new()), 0..0);
         match read_table(path, &file, true, names, report) {
@@ -105,7 +105,7 @@ impl NumberTable {
             list_columns.push(ListColumn {
                 name,
                 header,
-                index,
+                column_index: index,
                 is_known,
                 values,
                 is_clock: false,
@@ -200,7 +200,7 @@ pub struct ListColumn {
     /// The name in the file.
     pub header: String,
     /// The index in the file, from 0.
-    pub index: usize,
+    pub column_index: usize,
     /// Whether the reader knows the name. An unknown column has no values.
     pub is_known: bool,
     /// The value of each row.
@@ -256,7 +256,14 @@ fn read_table(
             let name = Located { value: name, location: file_location.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
-            columns.push(ListColumn { name, header, index, is_known, values, is_clock });
+            columns.push(ListColumn {
+                name,
+                header,
+                column_index: index,
+                is_known,
+                values,
+                is_clock,
+            });
         }
         return Ok((
             NumberTable {
@@ -270,7 +277,7 @@ fn read_table(
     let text = text::decode_text(bytes)?;
     // The report gets the text after it is read, because this function borrows it until then.
     let source = report.add(shorten_path(path), String::new());
-    let text_table = csv::read(&text, source, allows_missing, names, report);
+    let text_table = csv::read_text_table(&text, source, allows_missing, names, report);
     report.set_text(source, text);
     let csv::TextTable { columns, row_starts, separator, preamble_lines } = text_table?;
     Ok((

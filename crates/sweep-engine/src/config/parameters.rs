@@ -28,12 +28,12 @@ pub fn set_constants<M: Model>(
             let read_number = |range: Range| section.number_named(name.value, range);
             constants.extend(read_constant(name.clone(), read_number, false, draft));
         }
-        apply(&constants, draft);
+        write_constants(&constants, draft);
     }
     let mut constants = read_arguments("--set", sets, draft);
     constants.extend(read_arguments("--at", at_arguments, draft));
     let plan_before = draft.plan.clone();
-    apply(&constants, draft);
+    write_constants(&constants, draft);
     // A constant that equals the file's value does not change the plan.
     let changes_plan = |constant: &&SetConstant<M>| {
         let mut plan_after = plan_before.clone();
@@ -66,7 +66,7 @@ pub fn fix_point<M: Model>(at_arguments: &[String], draft: &mut Draft<'_, M>) ->
         }
     }
     draft.plan.design = None;
-    apply(&constants, draft);
+    write_constants(&constants, draft);
     constants.into_iter().map(|constant| (constant.name.value, constant.value.value)).collect()
 }
 
@@ -91,14 +91,17 @@ fn read_constant<M: Model>(
     overrides_file: bool,
     draft: &Draft<'_, M>,
 ) -> Option<SetConstant<M>> {
-    let parameter = find(&name, draft)?;
+    let parameter = find_parameter(&name, draft)?;
     let value = number(parameter.range)?;
     let name = Located { value: name.value.to_owned(), location: name.location };
     Some(SetConstant { name, parameter, value, overrides_file })
 }
 
 /// Finds the parameter of this name; an unknown name is reported.
-pub fn find<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<ModelParameter<M>> {
+pub fn find_parameter<M: Model>(
+    name: &Located<&str>,
+    draft: &Draft<'_, M>,
+) -> Option<ModelParameter<M>> {
     let refuse =
         |error| draft.report.push_with(|_| unknown_parameter(name, &error, &draft.plan.model));
     draft.plan.model.find(name.value).map_err(refuse).ok()
@@ -136,7 +139,7 @@ pub fn unknown_parameter<M: Model>(
 }
 
 /// Writes constants of equal precedence.
-fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
+fn write_constants<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
     let mut written_numbers = WrittenNumbers::default();
     for constant in constants {
         if written_numbers.record(&constant.name, constant.parameter.parts.clone(), draft.report) {

@@ -13,11 +13,11 @@ use crate::{Model, ModelParameter};
 /// Reports a window that is invalid at a corner of the grid.
 pub fn check_windows<M: Model>(draft: &Draft<'_, M>) {
     let mut reported_keys = BTreeSet::new();
-    for corner in 0..draft.plan.corners() {
+    for corner in 0..draft.plan.corner_count() {
         if draft.report.is_full() || !reported_keys.is_empty() {
             break;
         }
-        let window_s = draft.plan.window_at(&draft.plan.corner(corner));
+        let window_s = draft.plan.window_at(&draft.plan.corner_values(corner));
         check_window(draft, window_s, &mut reported_keys);
     }
 }
@@ -39,11 +39,16 @@ pub fn check_window<M: Model>(
     let [from_s, to_s, end_s] = [from_s, to_s, end_s].map(decimal);
     let title =
         format!("the window from {from_s} s to {to_s} s does not fit into a run to {end_s} s");
-    refuse(draft, title, &keys, "expected window_from_s < window_to_s <= end_s");
+    refuse_numbers(draft, title, &keys, "expected window_from_s < window_to_s <= end_s");
 }
 
 /// Reports a combination of numbers at each location where one of them was written.
-pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, keys: &[String], expected: &str) {
+pub fn refuse_numbers<M: Model>(
+    draft: &Draft<'_, M>,
+    title: String,
+    keys: &[String],
+    expected: &str,
+) {
     draft.report.push_with(|sources| {
         let labels = once(expected).chain(repeat("and this"));
         let locations = find_locations(draft, keys, sources);
@@ -100,7 +105,7 @@ pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
         return;
     };
     let expected = format!("expected a step from {:e} s to {end} s", shortest_step_s(end_s));
-    let refusal = refuse_step(draft, title, &expected);
+    let refusal = step_mistake(draft, title, &expected);
     let end = draft.report.location("time.end_s").into_iter();
     draft
         .report
@@ -109,7 +114,7 @@ pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
 
 /// Returns the mistake of a step. It is at the step's location, or at the section if the file gives
 /// no step.
-pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
+pub fn step_mistake<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
     let step =
         draft.report.location("integrator.step_s").or_else(|| draft.report.location("integrator"));
     step.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {

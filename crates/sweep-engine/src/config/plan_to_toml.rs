@@ -4,7 +4,9 @@ use serde_json::{Map, Value};
 use toml::Table;
 
 /// Writes a TOML file with these keys. Nulls are left out, which TOML does not have.
-pub(super) fn file<'a>(entries: impl IntoIterator<Item = (&'a String, &'a Value)>) -> String {
+pub(super) fn format_toml<'a>(
+    entries: impl IntoIterator<Item = (&'a String, &'a Value)>,
+) -> String {
     let entries: Map<String, Value> =
         entries.into_iter().map(|(key, value)| (key.clone(), value.clone())).collect();
     // All other values of JSON have a counterpart in TOML.

@@ -1,7 +1,7 @@
 //! Checks of a table whose columns are the axes of a plan, in place of its grid.
 
 use super::parameters::unknown_parameter;
-use super::{Diagnostic, Diagnostics, Located, Location, Report, quote, refused_number};
+use super::{Diagnostic, Diagnostics, Located, Location, Report, number_mistake, quote};
 use crate::Model;
 use crate::{Axis, Plan};
 
@@ -102,7 +102,7 @@ fn value_off_axis<M: Model>(
         None => Diagnostic::new(format!("{description} has no value"))
             .at_location(&name.location, format!("expected {range}")),
         Some(value) if !range.contains(value) => {
-            refused_number(&description, value, &name.location, range)
+            number_mistake(&description, value, &name.location, range)
         }
         Some(value) => {
             let title = format!("{description} = {value} is off the plan's axis");

@@ -14,10 +14,10 @@ use super::source::{Location, SourceLine, Sources, floor_char_boundary};
 const MAX_WHOLE_LINE_BYTES: usize = 4000;
 /// Length of the part of a long line that is shown, bytes. Basis: a line of a terminal. Doubling it
 /// shows twice as much.
-const WINDOW_BYTES: usize = 130;
+const SHOWN_PART_BYTES: usize = 130;
 /// Length of the shown part of a long line before the mistake, bytes. Basis: a third of
-/// [`WINDOW_BYTES`]. Doubling it leaves less room for the text after the mistake.
-const WINDOW_LEAD_BYTES: usize = 40;
+/// [`SHOWN_PART_BYTES`]. Doubling it leaves less room for the text after the mistake.
+const SHOWN_LEAD_BYTES: usize = 40;
 
 fn renderer(colour: bool) -> Renderer {
     if colour { Renderer::styled() } else { Renderer::plain() }
@@ -49,7 +49,7 @@ fn add_snippet<'a>(
 ) -> Group<'a> {
     let location = &diagnostic.locations[k].0;
     let line = sources.line(location);
-    let window = window(&line);
+    let window = shown_window(&line);
     let column = line.text[..line.span.start].chars().count() + 1;
     let mut snippet = Snippet::source(&line.text[window.clone()]).line_start(line.number);
     for (j, (other, label)) in diagnostic.locations.iter().enumerate() {
@@ -74,12 +74,12 @@ fn add_snippet<'a>(
 }
 
 /// Returns the part of a line that is shown, in its bytes.
-fn window(line: &SourceLine<'_>) -> Range<usize> {
+fn shown_window(line: &SourceLine<'_>) -> Range<usize> {
     if line.text.len() <= MAX_WHOLE_LINE_BYTES {
         return 0..line.text.len();
     }
-    let start = floor_char_boundary(line.text, line.span.start.saturating_sub(WINDOW_LEAD_BYTES));
-    start..floor_char_boundary(line.text, start + WINDOW_BYTES)
+    let start = floor_char_boundary(line.text, line.span.start.saturating_sub(SHOWN_LEAD_BYTES));
+    start..floor_char_boundary(line.text, start + SHOWN_PART_BYTES)
 }
 
 /// Returns the last line, which counts the mistakes.

@@ -71,7 +71,7 @@ pub struct Section<'a> {
     /// The keys that were read.
     read_keys: RefCell<Vec<&'static str>>,
     /// The keys that are valid in another place or variant, with the reason why they are rejected.
-    misplaced: RefCell<BTreeMap<&'static str, String>>,
+    misplacement_reasons: RefCell<BTreeMap<&'static str, String>>,
 }
 
 impl<'a> Section<'a> {
@@ -84,7 +84,14 @@ impl<'a> Section<'a> {
     ) -> Self {
         let read_keys = RefCell::default();
         let misplaced = RefCell::default();
-        Self { title: title.into(), location, table, report, read_keys, misplaced }
+        Self {
+            title: title.into(),
+            location,
+            table,
+            report,
+            read_keys,
+            misplacement_reasons: misplaced,
+        }
     }
 
     /// Returns the location of the table.
@@ -123,9 +130,9 @@ impl<'a> Section<'a> {
     }
 
     /// Rejects these keys with this reason instead of "unknown key".
-    pub fn misplace(&self, keys: &[&'static str], reason: &str) {
+    pub fn mark_misplaced(&self, keys: &[&'static str], reason: &str) {
         // The first reason of a key is kept, because it is the more specific one.
-        let mut misplaced = self.misplaced.borrow_mut();
+        let mut misplaced = self.misplacement_reasons.borrow_mut();
         for key in keys {
             misplaced.entry(key).or_insert_with(|| reason.to_owned());
         }
@@ -242,7 +249,7 @@ impl<'a> Section<'a> {
         self.text(key).and_then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
             if position.is_none() {
-                self.report.push_with(|_| unknown_word(key, &found, choices));
+                self.report.push_with(|_| unknown_word_mistake(key, &found, choices));
             }
             position.map(|value| Located { value, location: found.location })
         })
@@ -262,7 +269,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         range: Range,
     ) -> Field<(Vec<Located<f64>>, bool)> {
-        self.items(key, "an array of numbers").map(|items| {
+        self.read_items(key, "an array of numbers").map(|items| {
             let parse_item = |item| self.parse_number(&describe_array_entry(key), item, range);
             let numbers: Vec<_> = items.value.iter().filter_map(parse_item).collect();
             let are_all_valid = numbers.len() == items.value.len();
@@ -272,7 +279,7 @@ impl<'a> Section<'a> {
 
     /// Reads the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
-        self.items(key, "an array of strings").map(|items| {
+        self.read_items(key, "an array of strings").map(|items| {
             items
                 .value
                 .iter()
@@ -281,7 +288,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    fn items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
+    fn read_items(&self, key: &'static str, kind: &str) -> Field<&'a [Value<'a>]> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Array(items) => Some(&items[..]),
             _ => self.report_wrong_type(&quote(key), value, kind),
@@ -301,8 +308,10 @@ impl<'a> Section<'a> {
     /// Reads an array of tables, `[[key]]`; it is empty if the key is absent.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let expected_tables = format!("tables, each under [[{key}]]");
-        let items =
-            self.items(key, &expected_tables).into_located().map_or(&[][..], |items| items.value);
+        let items = self
+            .read_items(key, &expected_tables)
+            .into_located()
+            .map_or(&[][..], |items| items.value);
         let section_of_item = |(k, item): (usize, &'a Value<'a>)| {
             let DeValue::Table(table) = item.get_ref() else {
                 return self.report_wrong_type(&describe_array_entry(key), item, &expected_tables);
@@ -360,7 +369,7 @@ impl<'a> Section<'a> {
     /// Reports every key that was not read.
     pub fn finish(self) {
         let read_keys = self.read_keys.into_inner();
-        let misplaced = self.misplaced.into_inner();
+        let misplaced = self.misplacement_reasons.into_inner();
         for key in self.table.keys() {
             let name: &str = key.get_ref();
             if read_keys.contains(&name) {
@@ -378,7 +387,7 @@ impl<'a> Section<'a> {
                         shorten(name),
                         self.title
                     ))
-                    .at_location(&location, format!("expected {}", list_choices(&read_keys)))
+                    .at_location(&location, format!("expected {}", format_choices(&read_keys)))
                     .with_nearest_name(name, read_keys.iter().copied()),
                 }
             });
@@ -387,7 +396,7 @@ impl<'a> Section<'a> {
 }
 
 /// Returns the mistake of a number that is written twice.
-pub fn written_twice(
+pub fn written_twice_mistake(
     second: &Located<impl AsRef<str>>,
     first: &Located<impl AsRef<str>>,
 ) -> Diagnostic {
@@ -406,7 +415,7 @@ struct RemovedWord {
     key: &'static str,
     word: &'static str,
     /// The word that replaces the removed one, in models that have it.
-    successor: &'static str,
+    successor_word: &'static str,
     reason: &'static str,
 }
 
@@ -414,29 +423,33 @@ struct RemovedWord {
 const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
     key: "method",
     word: "rodas5p",
-    successor: "additive",
+    successor_word: "additive",
     reason: "it has the same keys and takes stiff bearings in steps as long",
 }];
 
 /// Returns the mistake of a word that is not among the choices.
-pub fn unknown_word(description: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
+pub fn unknown_word_mistake(
+    description: &str,
+    found: &Located<&str>,
+    choices: &[&str],
+) -> Diagnostic {
     let removed_word = REMOVED_WORDS.iter().find(|removed_word| {
         removed_word.key == description
             && removed_word.word == found.value
-            && choices.contains(&removed_word.successor)
+            && choices.contains(&removed_word.successor_word)
     });
     let refusal = Diagnostic::new(format!("unknown {description} \"{}\"", shorten(found.value)))
-        .at_location(&found.location, format!("expected {}", list_choices(choices)));
+        .at_location(&found.location, format!("expected {}", format_choices(choices)));
     match removed_word {
-        Some(RemovedWord { key, word, successor, reason }) => refusal.with_help(format!(
-            "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
-        )),
+        Some(RemovedWord { key, word, successor_word: successor, reason }) => refusal.with_help(
+            format!("\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"),
+        ),
         None => refusal.with_nearest_name(found.value, choices.iter().copied()),
     }
 }
 
 /// Lists choices: `a`, `a or b`, `one of a, b, c`.
-pub fn list_choices(choices: &[&str]) -> String {
+pub fn format_choices(choices: &[&str]) -> String {
     match choices {
         [] => "nothing".to_owned(),
         [only] => format!("`{only}`"),
@@ -484,12 +497,12 @@ pub fn check_number(
     if range.contains(value) {
         return Some(Located { value, location });
     }
-    report.push(refused_number(description, value, &location, range));
+    report.push(number_mistake(description, value, &location, range));
     None
 }
 
 /// Returns the mistake of a number that is not finite or not in range.
-pub fn refused_number(
+pub fn number_mistake(
     description: &str,
     value: f64,
     location: &Location,

@@ -7,18 +7,18 @@ use serde_json::json;
 use sweep_parameter::{Range, decimal};
 
 use super::form::NumberArray;
-use super::keys::{Description, Variants};
+use super::keys::{Description, KeyVariants};
 use super::{
     Diagnostic, Field, Form, GridInput, Key, KeyWalk, Keys, Located, Location, Report, Section,
     design,
 };
 use crate::method::{IntegrationMethod, Integrator, Setting};
-use crate::plan::{MAX_END_S, NumberSources, Plan, RATIO_MIN, ReadingNotes, Reliability};
+use crate::plan::{MAX_END_S, NumberSources, Plan, RATIO_MIN_RANGE, ReadingNotes, Reliability};
 use crate::{GridTable, Model};
 
 impl<M: Model> Plan<M> {
     /// Returns the plan of a grid file without keys: the defaults.
-    pub(super) fn blank() -> Self {
+    pub(super) fn blank_plan() -> Self {
         let end_s = 50.0;
         Self {
             name: String::new(),
@@ -40,14 +40,14 @@ impl<M: Model> Plan<M> {
 }
 
 /// Walks over every key of a plan except its axes and `[set]`.
-pub fn walk<M: Model>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
+pub fn walk_plan_keys<M: Model>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
     walk_sections(plan, keys, None);
-    design::walk(&mut plan.design, keys);
+    design::walk_design(&mut plan.design, keys);
 }
 
 /// Returns the description of the keys of grid files, except axes and `[set]`.
 pub fn describe_keys<M: Model>() -> Description {
-    Keys::described(true, |keys| walk(&mut Plan::<M>::blank(), keys))
+    Keys::described(true, |keys| walk_plan_keys(&mut Plan::<M>::blank_plan(), keys))
 }
 
 /// Walks over the keys that are read before `[set]`; `input` is the grid that is read.
@@ -83,7 +83,7 @@ pub(super) fn walk_sections<M: Model>(
         let description = "if given, a point is reliable where every ratio is above this too";
         keys.walk_key(
             Key::new("ratio_min", description).settable(),
-            &Form::Number(RATIO_MIN),
+            &Form::Number(RATIO_MIN_RANGE),
             &mut limits.lower,
         );
         let key = Key::new("channels", "channels that are compared").settable();
@@ -224,9 +224,9 @@ fn walk_method(
     integrator: &mut Integrator,
     keys: &mut Keys<'_>,
 ) {
-    let variants = Variants {
+    let variants = KeyVariants {
         words: methods.iter().map(|method| (method.name, method.description)).collect(),
-        default: Some(methods.len() - 1),
+        default_index: Some(methods.len() - 1),
         settable_count: methods.len(),
     };
     let current_method = methods.iter().position(|method| method.name == integrator.name());
@@ -249,7 +249,7 @@ fn walk_method(
                     ("methods", "have")
                 };
                 let quoted_methods = methods_with_key.join("\" and \"");
-                keys.misplace(
+                keys.mark_misplaced(
                     &[key],
                     &format!("only the {noun} \"{quoted_methods}\" {verb} it, not \"{name}\""),
                 );

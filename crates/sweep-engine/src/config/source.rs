@@ -57,7 +57,7 @@ struct SourceText {
 ///
 /// # Errors
 /// The system's error, or the reason why the file is no text.
-pub fn read(path: &Path) -> io::Result<String> {
+pub fn read_text_file(path: &Path) -> io::Result<String> {
     let bytes = regular::read_text(path, MAX_TEXT_BYTES + 1)?;
     let refuse = |reason: String| Err(io::Error::other(reason));
     if bytes.starts_with(b"PAR1") {
@@ -175,7 +175,7 @@ mod tests {
         let read_bytes = |bytes: &[u8]| {
             let path = folder.path().join("file");
             std::fs::write(&path, bytes).unwrap();
-            read(&path)
+            read_text_file(&path)
         };
         assert_eq!(read_bytes(b"name = 1").unwrap(), "name = 1");
         let read_error = |bytes: &[u8]| read_bytes(bytes).unwrap_err().to_string();
@@ -188,6 +188,6 @@ mod tests {
                 .starts_with("it is longer than 896 KiB")
         );
         assert!(read_bytes(&largest_text).is_ok());
-        assert!(read(folder.path()).is_err());
+        assert!(read_text_file(folder.path()).is_err());
     }
 }

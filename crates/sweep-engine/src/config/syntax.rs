@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, Error};
 
-use super::source::read;
+use super::source::read_text_file;
 use super::{Diagnostic, Location, Report, SourceId, quote};
 
 /// Reads the text of a file and adds it to the report. A file that cannot be read is reported:
@@ -18,7 +18,7 @@ pub fn read_text(
     report: &Report,
 ) -> Option<(String, SourceId)> {
     let path_text = path.display();
-    let error = match read(path) {
+    let error = match read_text_file(path) {
         Ok(text) => {
             let source = report.add(path_text.to_string(), text.as_str());
             return Some((text, source));

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Diagnostic, Field, Located, Report, Section, unknown_word};
+use super::{Diagnostic, Field, Located, Report, Section, unknown_word_mistake};
 
 /// Reads a list of words of `all`, each once; an empty list is a mistake.
 pub fn read_words(
@@ -34,7 +34,7 @@ pub fn check_words<'t>(
         let first = valid_words.iter().find(|other| other.value == found.value);
         are_all_valid &= is_known && first.is_none();
         match first {
-            _ if !is_known => report.push_with(|_| unknown_word(noun, &found, all)),
+            _ if !is_known => report.push_with(|_| unknown_word_mistake(noun, &found, all)),
             Some(first) => {
                 let title = format!("the {noun} \"{}\" is given twice", found.value);
                 let refusal = Diagnostic::new(title)

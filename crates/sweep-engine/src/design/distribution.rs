@@ -153,14 +153,14 @@ fn standard_quantile(p: f64) -> f64 {
         let r = 0.180_625 - q * q;
         return q * polynomial(&A, r) / polynomial(&B, r);
     }
-    let tail = if q < 0.0 { p } else { 1.0 - p };
-    if tail <= 0.0 {
+    let tail_probability = if q < 0.0 { p } else { 1.0 - p };
+    if tail_probability <= 0.0 {
         return if q < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY };
     }
-    let r = (-libm::log(tail)).sqrt();
+    let r = (-libm::log(tail_probability)).sqrt();
     let (numerator, denominator, r) = if r <= 5.0 { (C, D, r - 1.6) } else { (E, F, r - 5.0) };
-    let value = polynomial(&numerator, r) / polynomial(&denominator, r);
-    if q < 0.0 { -value } else { value }
+    let magnitude = polynomial(&numerator, r) / polynomial(&denominator, r);
+    if q < 0.0 { -magnitude } else { magnitude }
 }
 
 #[cfg(test)]
@@ -200,17 +200,17 @@ mod tests {
             (normal, 20.0, 60.0),
             (lognormal, 80.0, 110.0),
         ] {
-            let truncated = Distribution { shape, from, to };
+            let truncated_distribution = Distribution { shape, from, to };
             let values: Vec<f64> =
-                (0..=100).map(|k| truncated.quantile(f64::from(k) / 100.0)).collect();
+                (0..=100).map(|k| truncated_distribution.quantile(f64::from(k) / 100.0)).collect();
             assert!(values.windows(2).all(|pair| pair[0] < pair[1]), "{values:?}");
             assert!(
                 (values[0] - from).abs() < 1e-6 && (values[100] - to).abs() < 1e-6,
-                "{truncated:?}"
+                "{truncated_distribution:?}"
             );
         }
-        let symmetric = Distribution { shape: normal, from: 40.0, to: 160.0 };
-        assert!((symmetric.quantile(0.5) - 100.0).abs() < 1e-12);
-        assert!((symmetric.quantile(0.975) - 119.599_639_8).abs() < 1e-6);
+        let symmetric_distribution = Distribution { shape: normal, from: 40.0, to: 160.0 };
+        assert!((symmetric_distribution.quantile(0.5) - 100.0).abs() < 1e-12);
+        assert!((symmetric_distribution.quantile(0.975) - 119.599_639_8).abs() < 1e-6);
     }
 }

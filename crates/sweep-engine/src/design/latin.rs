@@ -20,20 +20,20 @@ fn permute(index: u64, length: u64, key: u64) -> u64 {
     /// it doubles the time of a point.
     const ROUNDS: u64 = 6;
     let bits = u64::BITS - length.saturating_sub(1).leading_zeros();
-    let half = bits.div_ceil(2).max(1);
-    let mask = (1_u64 << half) - 1;
-    let mut value = index;
+    let half_bits = bits.div_ceil(2).max(1);
+    let mask = (1_u64 << half_bits) - 1;
+    let mut image = index;
     loop {
-        let mut left = value >> half;
-        let mut right = value & mask;
+        let mut left_half = image >> half_bits;
+        let mut right_half = image & mask;
         for round in 0..ROUNDS {
-            let next = left ^ (mix(key ^ (right << 8) ^ round) & mask);
-            left = right;
-            right = next;
+            let next_half = left_half ^ (mix(key ^ (right_half << 8) ^ round) & mask);
+            left_half = right_half;
+            right_half = next_half;
         }
-        value = left << half | right;
-        if value < length {
-            return value;
+        image = left_half << half_bits | right_half;
+        if image < length {
+            return image;
         }
     }
 }

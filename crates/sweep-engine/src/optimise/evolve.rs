@@ -31,13 +31,13 @@ const DIFFERENCE_FACTOR_RANGE: [f64; 2] = [0.3, 0.9];
 #[derive(Clone, Copy, Debug)]
 pub struct Evolution {
     /// The number of coordinates, each from 0 to 1.
-    pub parameters: usize,
+    pub parameter_count: usize,
     /// The number of objectives, all minimised; the other numbers are constraint violations.
-    pub objectives: usize,
+    pub objective_count: usize,
     /// The number of members of a generation, at least 4.
-    pub population: u64,
+    pub population_size: u64,
     /// The number of trials in all.
-    pub candidates: u64,
+    pub candidate_count: u64,
     /// The seed of the random numbers.
     pub seed: u64,
 }
@@ -48,7 +48,7 @@ pub struct Candidate {
     /// The position in the unit box.
     pub position: Vec<f64>,
     /// The objectives, then the constraint violations; `None` if one of them is missing.
-    pub responses: Option<Vec<f64>>,
+    pub evaluation: Option<Vec<f64>>,
     /// The generation, from 0.
     pub generation: u64,
 }
@@ -57,7 +57,7 @@ impl Evolution {
     /// Returns the index of the first trial of the last third, if that third begins after the first
     /// generation. With one objective, these trials start from the best candidate.
     pub fn first_of_last_third(&self) -> u64 {
-        let Self { candidates, population, .. } = *self;
+        let Self { candidate_count: candidates, population_size: population, .. } = *self;
         (candidates - candidates / 3).max(population.min(candidates))
     }
 }
@@ -65,7 +65,7 @@ impl Evolution {
 impl Candidate {
     /// Returns whether the candidate has all responses and violates no constraint.
     pub fn is_feasible(&self, objectives: usize) -> bool {
-        self.responses.as_ref().is_some_and(|responses| {
+        self.evaluation.as_ref().is_some_and(|responses| {
             responses[objectives..].iter().all(|&violation| violation <= 0.0)
         })
     }
@@ -80,53 +80,59 @@ pub fn evolve<E>(
     evolution: &Evolution,
     evaluate: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
 ) -> Result<Vec<Candidate>, E> {
-    let Evolution { parameters, objectives, population, candidates, seed } = *evolution;
-    let mut evaluated: Vec<Candidate> = Vec::new();
+    let Evolution {
+        parameter_count: parameters,
+        objective_count: objectives,
+        population_size: population,
+        candidate_count: candidates,
+        seed,
+    } = *evolution;
+    let mut evaluated_candidates: Vec<Candidate> = Vec::new();
     let mut members: Vec<usize> = Vec::new();
     for generation in 0.. {
-        let count = population.min(candidates - evaluated.len() as u64);
-        if count == 0 {
+        let generation_size = population.min(candidates - evaluated_candidates.len() as u64);
+        if generation_size == 0 {
             break;
         }
-        let first = evaluated.len();
-        let ranks = Ranks::new(&evaluated, objectives);
+        let first_trial = evaluated_candidates.len();
+        let ranks = CandidateRanking::new(&evaluated_candidates, objectives);
         let choose_better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
-        let best = members.iter().copied().reduce(choose_better);
+        let best_member = members.iter().copied().reduce(choose_better);
         let initial_design =
-            Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed };
-        let position = |k: u64| -> Vec<f64> {
+            Design::Spread { rule: DesignRule::LatinHypercube, points: generation_size, seed };
+        let trial_position = |k: u64| -> Vec<f64> {
             if generation == 0 {
                 return (0..parameters)
                     .filter_map(|axis| initial_design.position(k, axis))
                     .collect();
             }
-            let trial_number = first as u64 + k;
-            let start_candidate =
-                best.filter(|_| objectives == 1 && trial_number >= evolution.first_of_last_third());
+            let trial_number = first_trial as u64 + k;
+            let start_candidate = best_member
+                .filter(|_| objectives == 1 && trial_number >= evolution.first_of_last_third());
             create_trial(
-                &evaluated,
+                &evaluated_candidates,
                 &members,
                 (k as usize, start_candidate),
                 trial_number,
                 evolution,
             )
         };
-        let positions: Vec<Vec<f64>> = (0..count).map(position).collect();
-        let responses = evaluate(&positions)?;
-        let trials = positions.into_iter().zip(responses);
-        evaluated.extend(trials.map(|(position, responses)| Candidate {
-            position,
-            responses,
+        let positions: Vec<Vec<f64>> = (0..generation_size).map(trial_position).collect();
+        let evaluations = evaluate(&positions)?;
+        let trials = positions.into_iter().zip(evaluations);
+        evaluated_candidates.extend(trials.map(|(trial_position, evaluations)| Candidate {
+            position: trial_position,
+            evaluation: evaluations,
             generation,
         }));
         if generation == 0 {
-            members = (0..evaluated.len()).collect();
+            members = (0..evaluated_candidates.len()).collect();
             continue;
         }
-        let ranks = Ranks::new(&evaluated, objectives);
+        let ranks = CandidateRanking::new(&evaluated_candidates, objectives);
         let mut survivors = Vec::with_capacity(2 * members.len());
         for (k, &member) in members.iter().enumerate() {
-            let trial = Some(first + k).filter(|&trial| trial < evaluated.len());
+            let trial = Some(first_trial + k).filter(|&trial| trial < evaluated_candidates.len());
             match trial.map(|trial| (trial, ranks.compare(trial, member))) {
                 Some((trial, Some(Ordering::Less | Ordering::Equal))) => survivors.push(trial),
                 Some((trial, None)) => survivors.extend([member, trial]),
@@ -135,7 +141,7 @@ pub fn evolve<E>(
         }
         members = ranks.select_best(survivors, population as usize);
     }
-    Ok(evaluated)
+    Ok(evaluated_candidates)
 }
 
 /// Returns the position of the trial that challenges a member. `trial_number` selects its random
@@ -147,88 +153,105 @@ fn create_trial(
     trial_number: u64,
     evolution: &Evolution,
 ) -> Vec<f64> {
-    let draws = Design::Spread {
+    let random_design = Design::Spread {
         rule: DesignRule::MonteCarlo,
-        points: evolution.candidates,
+        points: evolution.candidate_count,
         seed: evolution.seed,
     };
     let mut axis = 0;
-    let mut draw = || {
+    let mut draw_number = || {
         axis += 1;
-        draws.position(trial_number, axis).unwrap_or(0.5)
+        random_design.position(trial_number, axis).unwrap_or(0.5)
     };
-    let mut others = [member; 4];
+    let mut chosen_members = [member; 4];
     for k in 1..4 {
-        while others[..k].contains(&others[k]) {
-            others[k] = (draw() * members.len() as f64) as usize;
+        while chosen_members[..k].contains(&chosen_members[k]) {
+            chosen_members[k] = (draw_number() * members.len() as f64) as usize;
         }
     }
-    let [member_position, base, plus, minus] =
-        others.map(|other| candidates[members[other]].position.as_slice());
-    let factor = DIFFERENCE_FACTOR_RANGE[0]
-        + (DIFFERENCE_FACTOR_RANGE[1] - DIFFERENCE_FACTOR_RANGE[0]) * draw();
-    let (base, factor) = start_candidate
-        .map_or((base, factor), |best| (candidates[best].position.as_slice(), 0.5 * factor));
-    let from_mutant = (draw() * member_position.len() as f64) as usize;
-    let coordinate = |k: usize| {
-        let mutated = (base[k] + factor * (plus[k] - minus[k])).clamp(0.0, 1.0);
-        if draw() < CROSSOVER_RATE || k == from_mutant { mutated } else { member_position[k] }
+    let [member_position, base_position, plus_position, minus_position] =
+        chosen_members.map(|other| candidates[members[other]].position.as_slice());
+    let difference_factor = DIFFERENCE_FACTOR_RANGE[0]
+        + (DIFFERENCE_FACTOR_RANGE[1] - DIFFERENCE_FACTOR_RANGE[0]) * draw_number();
+    let (base_position, difference_factor) = start_candidate
+        .map_or((base_position, difference_factor), |best| {
+            (candidates[best].position.as_slice(), 0.5 * difference_factor)
+        });
+    let mutant_axis = (draw_number() * member_position.len() as f64) as usize;
+    let trial_coordinate = |k: usize| {
+        let mutant_coordinate = (base_position[k]
+            + difference_factor * (plus_position[k] - minus_position[k]))
+            .clamp(0.0, 1.0);
+        if draw_number() < CROSSOVER_RATE || k == mutant_axis {
+            mutant_coordinate
+        } else {
+            member_position[k]
+        }
     };
-    (0..member_position.len()).map(coordinate).collect()
+    (0..member_position.len()).map(trial_coordinate).collect()
 }
 
 /// Returns the Pareto front: the feasible candidates that no other one dominates.
-pub fn find_front(candidates: &[Candidate], objectives: usize) -> Vec<usize> {
-    let ranks = Ranks::new(candidates, objectives);
-    let feasible = (0..candidates.len()).filter(|&k| candidates[k].is_feasible(objectives));
-    let feasible: Vec<usize> = feasible.collect();
-    let dominated =
-        |k: usize| feasible.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less));
-    feasible.iter().copied().filter(|&k| !dominated(k)).collect()
+pub fn find_pareto_front(candidates: &[Candidate], objectives: usize) -> Vec<usize> {
+    let ranks = CandidateRanking::new(candidates, objectives);
+    let feasible_candidates =
+        (0..candidates.len()).filter(|&k| candidates[k].is_feasible(objectives));
+    let feasible_candidates: Vec<usize> = feasible_candidates.collect();
+    let is_dominated = |k: usize| {
+        feasible_candidates.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less))
+    };
+    feasible_candidates.iter().copied().filter(|&k| !is_dominated(k)).collect()
 }
 
 /// The order of candidates by constraint violation and dominance.
-struct Ranks<'a> {
+struct CandidateRanking<'a> {
     candidates: &'a [Candidate],
-    objectives: usize,
+    objective_count: usize,
     /// The sum of each candidate's violations, each divided by the greatest of all candidates.
-    violations: Vec<f64>,
+    relative_violations: Vec<f64>,
 }
 
-impl<'a> Ranks<'a> {
+impl<'a> CandidateRanking<'a> {
     fn new(candidates: &'a [Candidate], objectives: usize) -> Self {
-        let excesses = || {
+        let constraint_violations = || {
             candidates
                 .iter()
-                .filter_map(|candidate| Some(&candidate.responses.as_ref()?[objectives..]))
+                .filter_map(|candidate| Some(&candidate.evaluation.as_ref()?[objectives..]))
         };
-        let conditions = excesses().next().map_or(0, <[f64]>::len);
-        let greatest: Vec<f64> = (0..conditions)
-            .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
+        let condition_count = constraint_violations().next().map_or(0, <[f64]>::len);
+        let greatest_violations: Vec<f64> = (0..condition_count)
+            .map(|k| constraint_violations().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
             .collect();
-        let violation = |candidate: &Candidate| match &candidate.responses {
+        let relative_violation = |candidate: &Candidate| match &candidate.evaluation {
             Some(responses) => responses[objectives..]
                 .iter()
-                .zip(&greatest)
-                .map(|(excess, greatest)| excess / greatest)
+                .zip(&greatest_violations)
+                .map(|(excess, greatest_violations)| excess / greatest_violations)
                 .sum(),
             None => f64::INFINITY,
         };
-        Self { candidates, objectives, violations: candidates.iter().map(violation).collect() }
+        Self {
+            candidates,
+            objective_count: objectives,
+            relative_violations: candidates.iter().map(relative_violation).collect(),
+        }
     }
 
     fn objectives(&self, candidate: usize) -> &[f64] {
-        self.candidates[candidate].responses.as_ref().map_or(&[], |all| &all[..self.objectives])
+        self.candidates[candidate]
+            .evaluation
+            .as_ref()
+            .map_or(&[], |all| &all[..self.objective_count])
     }
 
     /// Compares two candidates: `Less` if the first is better, `None` if neither dominates.
     fn compare(&self, first: usize, second: usize) -> Option<Ordering> {
-        let [a, b] = [self.violations[first], self.violations[second]];
+        let [a, b] = [self.relative_violations[first], self.relative_violations[second]];
         if a > 0.0 || b > 0.0 {
             return Some(a.total_cmp(&b));
         }
-        let pairs = || self.objectives(first).iter().zip(self.objectives(second));
-        match (pairs().any(|(a, b)| a < b), pairs().any(|(a, b)| a > b)) {
+        let objective_pairs = || self.objectives(first).iter().zip(self.objectives(second));
+        match (objective_pairs().any(|(a, b)| a < b), objective_pairs().any(|(a, b)| a > b)) {
             (true, true) => None,
             (true, false) => Some(Ordering::Less),
             (false, true) => Some(Ordering::Greater),
@@ -239,42 +262,46 @@ impl<'a> Ranks<'a> {
     /// Returns at most `max_count` of these candidates, front by front; the most crowded of the
     /// last front are removed.
     fn select_best(&self, mut remaining: Vec<usize>, max_count: usize) -> Vec<usize> {
-        let mut selected = Vec::with_capacity(max_count);
-        while remaining.len() + selected.len() > max_count && selected.len() < max_count {
-            let dominated = |k: &usize| {
+        let mut selected_candidates = Vec::with_capacity(max_count);
+        while remaining.len() + selected_candidates.len() > max_count
+            && selected_candidates.len() < max_count
+        {
+            let is_dominated = |k: &usize| {
                 remaining.iter().any(|&other| self.compare(other, *k) == Some(Ordering::Less))
             };
             let (dominated_rest, mut front): (Vec<usize>, Vec<usize>) =
-                remaining.iter().partition(|k| dominated(k));
-            while front.len() + selected.len() > max_count {
+                remaining.iter().partition(|k| is_dominated(k));
+            while front.len() + selected_candidates.len() > max_count {
                 front.remove(self.find_most_crowded(&front));
             }
-            selected.extend(front);
+            selected_candidates.extend(front);
             remaining = dominated_rest;
         }
-        if selected.len() < max_count {
-            selected.extend(remaining);
+        if selected_candidates.len() < max_count {
+            selected_candidates.extend(remaining);
         }
-        selected
+        selected_candidates
     }
 
     /// Returns the index of the member of a front with the least crowding distance.
     fn find_most_crowded(&self, front: &[usize]) -> usize {
         let mut distances = vec![0.0; front.len()];
-        for k in 0..self.objectives {
-            let value = |index: usize| self.objectives(front[index]).get(k).copied().unwrap_or(0.0);
-            let mut order: Vec<usize> = (0..front.len()).collect();
-            order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
-            let [low, high] = [order[0], order[order.len() - 1]];
+        for k in 0..self.objective_count {
+            let objective_at =
+                |index: usize| self.objectives(front[index]).get(k).copied().unwrap_or(0.0);
+            let mut sorted_indices: Vec<usize> = (0..front.len()).collect();
+            sorted_indices.sort_by(|&a, &b| objective_at(a).total_cmp(&objective_at(b)));
+            let [low, high] = [sorted_indices[0], sorted_indices[sorted_indices.len() - 1]];
             distances[low] = f64::INFINITY;
             distances[high] = f64::INFINITY;
-            let extent = (value(high) - value(low)).max(f64::MIN_POSITIVE);
-            for triple in order.windows(3) {
-                distances[triple[1]] += (value(triple[2]) - value(triple[0])) / extent;
+            let objective_range = (objective_at(high) - objective_at(low)).max(f64::MIN_POSITIVE);
+            for triple in sorted_indices.windows(3) {
+                distances[triple[1]] +=
+                    (objective_at(triple[2]) - objective_at(triple[0])) / objective_range;
             }
         }
-        let nearest = (0..front.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]));
-        nearest.unwrap_or(0)
+        let most_crowded = (0..front.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+        most_crowded.unwrap_or(0)
     }
 }
 
@@ -286,13 +313,15 @@ mod tests {
 
     fn run_evolution(
         evolution: Evolution,
-        respond: impl Fn(&[f64]) -> Option<Vec<f64>>,
+        evaluate_position: impl Fn(&[f64]) -> Option<Vec<f64>>,
     ) -> Vec<Candidate> {
         let mut evaluate = |positions: &[Vec<f64>]| {
-            Ok::<_, Infallible>(positions.iter().map(|position| respond(position)).collect())
+            Ok::<_, Infallible>(
+                positions.iter().map(|position| evaluate_position(position)).collect(),
+            )
         };
         let Ok(candidates) = evolve(&evolution, &mut evaluate);
-        assert_eq!(candidates.len() as u64, evolution.candidates);
+        assert_eq!(candidates.len() as u64, evolution.candidate_count);
         assert!(
             candidates
                 .iter()
@@ -302,18 +331,23 @@ mod tests {
         candidates
     }
 
-    const SEARCH: Evolution =
-        Evolution { parameters: 2, objectives: 1, population: 32, candidates: 1500, seed: 1 };
+    const TEST_EVOLUTION: Evolution = Evolution {
+        parameter_count: 2,
+        objective_count: 1,
+        population_size: 32,
+        candidate_count: 1500,
+        seed: 1,
+    };
 
     #[test]
     fn rosenbrocks_function_is_minimised() {
         // The function is Rosenbrock's in [-2, 2], with its minimum at (1, 1): (0.75, 0.75) of the
         // box.
-        let candidates = run_evolution(SEARCH, |position| {
+        let candidates = run_evolution(TEST_EVOLUTION, |position| {
             let [x, y] = [4.0 * position[0] - 2.0, 4.0 * position[1] - 2.0];
             Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
         });
-        let best = &candidates[find_front(&candidates, 1)[0]];
+        let best = &candidates[find_pareto_front(&candidates, 1)[0]];
         assert!(best.position.iter().all(|x| (x - 0.75).abs() < 2e-3), "{best:?}");
     }
 
@@ -321,57 +355,66 @@ mod tests {
     fn the_minimum_is_feasible_and_has_objectives() {
         // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no responses for x >
         // 0.9.
-        let candidates = run_evolution(SEARCH, |position| {
-            let trial_number =
+        let candidates = run_evolution(TEST_EVOLUTION, |position| {
+            let evaluation =
                 vec![position[0] + position[1], (0.25 - position[0] * position[1]).max(0.0)];
-            (position[0] <= 0.9).then_some(trial_number)
+            (position[0] <= 0.9).then_some(evaluation)
         });
-        let best = &candidates[find_front(&candidates, 1)[0]];
-        let sum = best.responses.as_ref().unwrap()[0];
-        assert!(best.is_feasible(1) && (1.0..1.0005).contains(&sum), "{best:?}");
-        assert_eq!(find_front(&candidates[..0], 1), [0; 0]);
+        let best = &candidates[find_pareto_front(&candidates, 1)[0]];
+        let best_sum = best.evaluation.as_ref().unwrap()[0];
+        assert!(best.is_feasible(1) && (1.0..1.0005).contains(&best_sum), "{best:?}");
+        assert_eq!(find_pareto_front(&candidates[..0], 1), [0; 0]);
     }
 
     #[test]
     fn a_pareto_front_is_covered_from_end_to_end() {
         // The problem is Schaffer's, with the front from x = 0 to 2, where sqrt(f) + sqrt(g) = 2.
-        let two_objectives = Evolution { parameters: 1, objectives: 2, ..SEARCH };
+        let two_objectives = Evolution { parameter_count: 1, objective_count: 2, ..TEST_EVOLUTION };
         let candidates = run_evolution(two_objectives, |position| {
             let x = 20.0 * position[0] - 10.0;
             Some(vec![x * x, (x - 2.0) * (x - 2.0)])
         });
-        let mut roots: Vec<f64> = find_front(&candidates, 2)
+        let mut front_roots: Vec<f64> = find_pareto_front(&candidates, 2)
             .iter()
-            .map(|&k| candidates[k].responses.as_ref().unwrap()[0].sqrt())
+            .map(|&k| candidates[k].evaluation.as_ref().unwrap()[0].sqrt())
             .collect();
-        roots.sort_by(f64::total_cmp);
-        assert!(roots.len() > 100 && roots[0] < 0.02 && roots[roots.len() - 1] > 1.98, "{roots:?}");
-        assert!(roots.windows(2).all(|pair| pair[1] - pair[0] < 0.1), "{roots:?}");
+        front_roots.sort_by(f64::total_cmp);
+        assert!(
+            front_roots.len() > 100
+                && front_roots[0] < 0.02
+                && front_roots[front_roots.len() - 1] > 1.98,
+            "{front_roots:?}"
+        );
+        assert!(front_roots.windows(2).all(|pair| pair[1] - pair[0] < 0.1), "{front_roots:?}");
     }
 
     #[test]
     fn a_short_search_ends_close_to_the_minimum() {
         // Without trials from the best candidate, the median of the minima exceeds 1e-4.
-        let bowl =
+        let bowl_function =
             |position: &[f64]| (position[0] - 0.3).powi(2) + 3.0 * (position[1] - 0.6).powi(2);
-        let least = |seed| {
-            let short = Evolution { candidates: 256, seed, ..SEARCH };
-            let candidates = run_evolution(short, |position| Some(vec![bowl(position)]));
-            bowl(&candidates[find_front(&candidates, 1)[0]].position)
+        let least_found = |seed| {
+            let short_evolution = Evolution { candidate_count: 256, seed, ..TEST_EVOLUTION };
+            let candidates =
+                run_evolution(short_evolution, |position| Some(vec![bowl_function(position)]));
+            bowl_function(&candidates[find_pareto_front(&candidates, 1)[0]].position)
         };
-        let mut minima: Vec<f64> = (0..21).map(least).collect();
+        let mut minima: Vec<f64> = (0..21).map(least_found).collect();
         minima.sort_by(f64::total_cmp);
         assert!(minima[10] < 5e-5, "{minima:?}");
     }
 
     #[test]
     fn equal_answers_lead_to_equal_candidates() {
-        let sphere = |position: &[f64]| Some(vec![position.iter().map(|x| x * x).sum()]);
-        let short = Evolution { candidates: 150, ..SEARCH };
-        assert_eq!(run_evolution(SEARCH, sphere)[..100], run_evolution(short, sphere)[..100]);
+        let sphere_function = |position: &[f64]| Some(vec![position.iter().map(|x| x * x).sum()]);
+        let short_evolution = Evolution { candidate_count: 150, ..TEST_EVOLUTION };
+        assert_eq!(
+            run_evolution(TEST_EVOLUTION, sphere_function)[..100],
+            run_evolution(short_evolution, sphere_function)[..100]
+        );
         assert_ne!(
-            run_evolution(short, sphere),
-            run_evolution(Evolution { seed: 2, ..short }, sphere)
+            run_evolution(short_evolution, sphere_function),
+            run_evolution(Evolution { seed: 2, ..short_evolution }, sphere_function)
         );
     }
 }

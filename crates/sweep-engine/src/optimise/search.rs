@@ -23,29 +23,37 @@ pub fn search<M: Model>(
     execution: Execution<'_>,
 ) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
     let stored_candidates = trials.as_ref().map_or(0, Trials::trial_count) as u64;
-    let progress = Progress::new(execution.progress, study.evolution.candidates, stored_candidates);
+    let progress =
+        Progress::new(execution.progress, study.evolution.candidate_count, stored_candidates);
     let show_candidates = |candidates| progress.show(candidates);
     let threads = execution.threads()?;
     let engine = M::engine(&study.plan, None)?;
     let evaluator =
         CachedEvaluator::new(engine, threads, execution.interrupt, trials, &show_candidates)?;
     let layout = M::layout(&study.plan);
-    let mut count = 0;
+    let mut next_candidate = 0;
     let result = evolve(&study.evolution, &mut |positions| {
         let candidates: Vec<Vec<f64>> =
-            positions.iter().map(|position| study.values(position)).collect();
-        let keys: Vec<TrialKey> =
-            (count..).zip(&candidates).map(|(number, values)| trial_key(number, values)).collect();
-        count += positions.len() as u64;
-        let values = |k: usize, row| study.axis_values(&candidates[k], row);
-        let respond = |k: usize, points| compute_responses(study, &layout, &candidates[k], points);
-        let result = evaluator.evaluate(&keys, study.rows(), &values, &respond)?;
-        let signs = study.objectives.iter().map(|objective| objective.sign);
-        let signs: Vec<f64> = signs.chain(study.conditions.iter().map(|_| 1.0)).collect();
+            positions.iter().map(|position| study.parameter_values(position)).collect();
+        let keys: Vec<TrialKey> = (next_candidate..)
+            .zip(&candidates)
+            .map(|(number, axis_values_of_row)| trial_key(number, axis_values_of_row))
+            .collect();
+        next_candidate += positions.len() as u64;
+        let axis_values_of_row = |k: usize, row| study.axis_values(&candidates[k], row);
+        let reduce_rows = |k: usize, points| evaluate_goals(study, &layout, &candidates[k], points);
+        let result = evaluator.evaluate(
+            &keys,
+            study.rows_per_candidate(),
+            &axis_values_of_row,
+            &reduce_rows,
+        )?;
+        let goal_signs = study.objectives.iter().map(|objective| objective.sign);
+        let goal_signs: Vec<f64> = goal_signs.chain(study.conditions.iter().map(|_| 1.0)).collect();
         let apply_signs = |numbers: RequestValues| {
-            let signed = numbers.into_iter().zip(&signs);
+            let signed_numbers = numbers.into_iter().zip(&goal_signs);
             // If one number is missing, the candidate has none.
-            signed.map(|(number, sign)| number.map(|number| sign * number)).collect()
+            signed_numbers.map(|(number, sign)| number.map(|number| sign * number)).collect()
         };
         Ok(result.into_iter().map(apply_signs).collect())
     });
@@ -69,7 +77,7 @@ pub fn compute_slacks<M: Model>(
         CachedEvaluator::new(engine, threads, execution.interrupt, None, &ignore_count)?;
     let layout = M::layout(&study.plan);
     let found_slacks = Mutex::new(Vec::new());
-    let respond = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
+    let record_slacks = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
         let batch = collect_batch(study, &layout, values, points)?;
         let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
         *lock(&found_slacks) =
@@ -77,8 +85,12 @@ pub fn compute_slacks<M: Model>(
         Ok(RequestValues::new())
     };
     let keys = [trial_key(0, values)];
-    let result =
-        evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &respond);
+    let result = evaluator.evaluate(
+        &keys,
+        study.rows_per_candidate(),
+        &|_, row| study.axis_values(values, row),
+        &record_slacks,
+    );
     Ok(SearchStop::interrupted_to_none(result)?.map(|_| into_content(found_slacks)))
 }
 
@@ -88,7 +100,7 @@ pub(crate) fn row_defect(error: ArrowError) -> StoreError {
 }
 
 /// Returns the objectives of a candidate, then its constraint violations.
-fn compute_responses<M: Model>(
+fn evaluate_goals<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
@@ -110,15 +122,15 @@ fn collect_batch<M: Model>(
     values: &[f64],
     points: Vec<PointRows>,
 ) -> Result<RecordBatch, StoreError> {
-    let mut rows = BatchBuilder::new(layout);
-    let keyed_rows = |point_rows: PointRows| {
-        let row = point_rows.point % study.rows();
+    let mut batch_builder = BatchBuilder::new(layout);
+    let numbered_rows = |point_rows: PointRows| {
+        let row = point_rows.point % study.rows_per_candidate();
         point_rows.rows.into_iter().map(move |cells: RowCells| (row, cells))
     };
-    for (row, cells) in points.into_iter().flat_map(keyed_rows) {
-        rows.push_row(row, study.axis_values(values, row), cells);
+    for (row, cells) in points.into_iter().flat_map(numbered_rows) {
+        batch_builder.push_row(row, study.axis_values(values, row), cells);
     }
-    rows.take_batch().map_err(row_defect)
+    batch_builder.take_batch().map_err(row_defect)
 }
 
 /// Returns the key of a candidate: its number, and its parameters.

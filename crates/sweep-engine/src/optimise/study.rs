@@ -11,13 +11,14 @@ use super::Evolution;
 use crate::config::axes::{add_axis, read_range};
 use crate::config::design::{DEFAULT_SEED, MAX_SEED};
 use crate::config::grid::{STUDY_KEYS, read_draft, refuse_other_kind};
-use crate::config::parameters::find;
-use crate::config::section::list_choices;
+use crate::config::parameters::find_parameter;
+use crate::config::section::format_choices;
 use crate::config::sections::read_name;
 use crate::config::source::resolve_beside;
 use crate::config::syntax::{self, parse_toml};
 use crate::config::{
-    Diagnostic, Draft, Field, Located, Location, Report, Section, plan_checks, written_twice,
+    Diagnostic, Draft, Field, Located, Location, Report, Section, plan_checks,
+    written_twice_mistake,
 };
 use crate::design::{DesignRule, MAX_AXES};
 use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, ModelParameter, Plan};
@@ -87,8 +88,8 @@ impl<M: Model> Study<M> {
     }
 
     fn read(path: &Path, sets: &[String], report: &Report) -> Option<Self> {
-        let help = "docs/optimise.md has one to start from";
-        let (text, source) = syntax::read_text(path, "study", Some(help), report)?;
+        let start_advice = "docs/optimise.md has one to start from";
+        let (text, source) = syntax::read_text(path, "study", Some(start_advice), report)?;
         let table = parse_toml(&text, source, report);
         if refuse_other_kind::<M>("study", table.get_ref(), source, report) {
             return None;
@@ -103,10 +104,10 @@ impl<M: Model> Study<M> {
         let mut draft = input.and_then(|input| read_draft::<M>(&input, report));
         let grid = draft.as_ref().map(|draft| draft.plan.clone());
         if let Some(draft) = &mut draft {
-            merge_axes(&mut draft.plan);
+            convert_axes_to_ranges(&mut draft.plan);
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
-        let parameters = parameters(&root, root.tables(parameter), design, &mut draft);
+        let parameters = read_parameters(&root, root.tables(parameter), design, &mut draft);
         let population = root.whole_number(population, &(4..=MAX_CANDIDATES)).or_default(0);
         let candidates = root.whole_number(candidates, &(1..=MAX_CANDIDATES)).or_default(0);
         let seed = root.whole_number(seed, &(0..=MAX_SEED)).or_default(DEFAULT_SEED);
@@ -121,22 +122,23 @@ impl<M: Model> Study<M> {
         }
         let plan = draft.map(|draft| draft.plan);
         let axes = plan.as_ref().map_or(&[][..], |plan| &plan.axes);
-        let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name.to_string()).collect();
+        let axis_names: Vec<String> =
+            axes.iter().map(|axis| axis.parameter.name.to_string()).collect();
         let known_columns =
             plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
-        let rows = grid.as_ref().map_or(1, Plan::points);
-        if rows > MAX_ROWS {
-            let title = format!("a grid of {rows} points for every candidate");
+        let rows_per_candidate = grid.as_ref().map_or(1, Plan::points);
+        if rows_per_candidate > MAX_ROWS {
+            let title = format!("a grid of {rows_per_candidate} points for every candidate");
             report.refuse::<()>(root.location(), title, format!("expected at most {}", MAX_ROWS));
         }
         let goals = GoalReader {
             known_columns,
             is_plan_valid: report.is_clean(),
-            rows,
+            rows_per_candidate,
             text: &text,
             report,
         };
-        let objectives = objectives(&root, root.tables(objective), &goals, &names);
+        let objectives = read_objectives(&root, root.tables(objective), &goals, &axis_names);
         let conditions = root.texts(conditions).into_located();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
         let conditions =
@@ -147,47 +149,48 @@ impl<M: Model> Study<M> {
         let seed = seed?;
         plan.name.clone_from(&name);
         let evolution = Evolution {
-            parameters: parameters.len(),
-            objectives: objectives.len(),
-            population,
-            candidates,
+            parameter_count: parameters.len(),
+            objective_count: objectives.len(),
+            population_size: population,
+            candidate_count: candidates,
             seed,
         };
         Some(Self { name, plan, grid, parameters, objectives, conditions, evolution })
     }
 
     /// Returns the number of responses of a candidate: objectives and constraint violations.
-    pub fn responses(&self) -> usize {
+    pub fn evaluation_len(&self) -> usize {
         self.objectives.len() + self.conditions.len()
     }
 
     /// Returns the number of rows of a candidate.
-    pub fn rows(&self) -> u64 {
+    pub fn rows_per_candidate(&self) -> u64 {
         self.grid.points()
     }
 
     /// Returns the candidate's parameters at a position in the box of their bounds.
-    pub fn values(&self, position: &[f64]) -> Vec<f64> {
+    pub fn parameter_values(&self, position: &[f64]) -> Vec<f64> {
         let values = self.parameters.iter().zip(position);
         values.map(|(parameter, &position)| parameter.bounds.interpolate(position)).collect()
     }
 
     /// Returns the values of the plan's axes in a row of a candidate.
     pub fn axis_values(&self, values: &[f64], row: u64) -> Vec<f64> {
-        let mut location = self.grid.axis_values(row);
-        let axis_count = location.len();
+        let mut row_values = self.grid.axis_values(row);
+        let axis_count = row_values.len();
         let relative_deviation = |k: usize| {
             let position =
                 self.grid.design.as_ref().and_then(|design| design.position(row, axis_count + k));
             2.0 * position.unwrap_or(0.5) - 1.0
         };
         let parameters = self.parameters.iter().zip(values).enumerate();
-        let actual = parameters.map(|(k, (parameter, &value))| match parameter.tolerance {
-            0.0 => value,
-            tolerance => value * (1.0 + tolerance * relative_deviation(k)),
-        });
-        location.extend(actual);
-        location
+        let actual_parameters =
+            parameters.map(|(k, (parameter, &value))| match parameter.tolerance {
+                0.0 => value,
+                tolerance => value * (1.0 + tolerance * relative_deviation(k)),
+            });
+        row_values.extend(actual_parameters);
+        row_values
     }
 
     /// Returns the job of the store.
@@ -211,8 +214,8 @@ impl<M: Model> Study<M> {
             "objective": objectives.collect::<Value>(),
             "conditions": self.conditions.iter().map(Goal::text).collect::<Value>(),
             "tolerance": tolerances.collect::<Value>(),
-            "population": self.evolution.population,
-            "candidates": self.evolution.candidates,
+            "population": self.evolution.population_size,
+            "candidates": self.evolution.candidate_count,
             "seed": self.evolution.seed,
         })
     }
@@ -220,7 +223,7 @@ impl<M: Model> Study<M> {
 
 /// Makes every axis a range and drops the design, because rows of candidates lie anywhere in the
 /// ranges.
-fn merge_axes<M: Model>(plan: &mut Plan<M>) {
+fn convert_axes_to_ranges<M: Model>(plan: &mut Plan<M>) {
     for axis in &mut plan.axes {
         if let AxisValues::List(_) = axis.values {
             let [from, to] = axis.values.extremes();
@@ -231,7 +234,7 @@ fn merge_axes<M: Model>(plan: &mut Plan<M>) {
 }
 
 /// Reads every `[[parameter]]` and adds an axis for each valid one.
-fn parameters<M: Model>(
+fn read_parameters<M: Model>(
     root: &Section<'_>,
     sections: Vec<Section<'_>>,
     design: Option<&Design>,
@@ -244,54 +247,64 @@ fn parameters<M: Model>(
             format!("expected from 1 to {}, each with name, from and to", MAX_PARAMETERS);
         report.push_missing(Diagnostic::new(title).at_location(root.location(), expected));
     }
-    let mut searched = Vec::new();
+    let mut searched_parameters = Vec::new();
     for section in sections {
         let location = section.location().clone();
         let name = section.require(section.text("name"), "name", "the name of a parameter");
         let tolerance = section.number("tolerance", Range::NonNegative);
-        let expression =
-            name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
-        let range = expression.as_ref().map_or(Range::Any, |parameter| parameter.range);
-        section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
+        let found_parameter =
+            name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find_parameter(name, draft));
+        let range = found_parameter.as_ref().map_or(Range::Any, |parameter| parameter.range);
+        section
+            .mark_misplaced(&["count"], "the study has `candidates`, and finds the values itself");
         let bounds = read_range(section, range, Some(2));
         let spread_tolerance = match tolerance {
-            Field::Present(part) if part.value >= 1.0 => {
+            Field::Present(tolerance_field) if tolerance_field.value >= 1.0 => {
                 let title = "a tolerance of the whole value or more";
-                report.refuse(&part.location, title, "expected a part of the value, as 0.05")
+                report.refuse(
+                    &tolerance_field.location,
+                    title,
+                    "expected a part of the value, as 0.05",
+                )
             }
-            Field::Present(part) if draft.is_some() && !has_free_dimension(design, draft) => {
+            Field::Present(tolerance_field)
+                if draft.is_some() && !has_free_dimension(design, draft) =>
+            {
                 let title = "a tolerance without a design that spreads it";
                 let expected = format!(
                     "expected a [design] in the grid file, by \"sobol\" over at most {MAX_AXES} \
                      axes and parameters, \"latin_hypercube\" or \"monte_carlo\""
                 );
-                report.refuse(&part.location, title, expected)
+                report.refuse(&tolerance_field.location, title, expected)
             }
-            Field::Present(part) => Some(part.value),
+            Field::Present(tolerance_field) => Some(tolerance_field.value),
             _ => Some(0.0),
         };
         let (Some(name), Some(parameter), Some(bounds), Some(tolerance), Some(draft)) =
-            (name, expression, bounds, spread_tolerance, draft.as_mut())
+            (name, found_parameter, bounds, spread_tolerance, draft.as_mut())
         else {
             continue;
         };
         let shares_number = |other_parameter: &ModelParameter<M>| {
-            other_parameter.parts.iter().any(|part| parameter.parts.contains(part))
+            other_parameter
+                .parts
+                .iter()
+                .any(|tolerance_field| parameter.parts.contains(tolerance_field))
         };
         let overriding_constant = draft
             .constants
             .iter()
             .find(|constant| constant.overrides_file && shares_number(&constant.parameter));
-        let sweeping_axis = || {
+        let find_sweeping_axis = || {
             let mut axes = draft.plan.axes.iter().enumerate();
             let (k, axis) = axes.find(|(_, axis)| shares_number(&axis.parameter))?;
             let location = report.location(&format!("axis[{k}]"))?;
             Some(Located { value: axis.parameter.name.to_string(), location })
         };
         if let Some(first) =
-            overriding_constant.map(|constant| constant.name.clone()).or_else(sweeping_axis)
+            overriding_constant.map(|constant| constant.name.clone()).or_else(find_sweeping_axis)
         {
-            report.push(written_twice(&name, &first));
+            report.push(written_twice_mistake(&name, &first));
             continue;
         }
         let mut axis =
@@ -304,9 +317,9 @@ fn parameters<M: Model>(
             *high += tolerance * high.abs();
         }
         add_axis(axis, location, draft);
-        searched.push(SearchedParameter { bounds: bounds.value, tolerance });
+        searched_parameters.push(SearchedParameter { bounds: bounds.value, tolerance });
     }
-    searched
+    searched_parameters
 }
 
 /// Returns whether a design has room for another axis.
@@ -320,28 +333,30 @@ fn has_free_dimension<M: Model>(design: Option<&Design>, draft: &Option<Draft<'_
 }
 
 /// Reads every `[[objective]]`. Their columns come after those of the parameters.
-fn objectives(
+fn read_objectives(
     root: &Section<'_>,
     sections: Vec<Section<'_>>,
     goals: &GoalReader<'_>,
     parameters: &[String],
 ) -> Vec<Objective> {
-    const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
+    const OBJECTIVE_VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
     let mut objectives: Vec<Objective> = Vec::new();
     if sections.is_empty() {
         root.report_missing("objective", "[[objective]] with `minimise` or `maximise`");
     }
     for section in sections {
         let location = section.location().clone();
-        let texts = VERBS.map(|(verb, sign)| (section.text(verb).into_located(), sign));
+        let texts = OBJECTIVE_VERBS.map(|(verb, sign)| (section.text(verb).into_located(), sign));
         section.finish();
         let [text] = &texts
             .into_iter()
             .filter_map(|(text, sign)| Some((text?, sign)))
             .collect::<Vec<_>>()[..]
         else {
-            let expected =
-                format!("expected {}, and an expression", list_choices(&VERBS.map(|(v, _)| v)));
+            let expected = format!(
+                "expected {}, and an expression",
+                format_choices(&OBJECTIVE_VERBS.map(|(v, _)| v))
+            );
             root.report.refuse::<()>(
                 &location,
                 "an objective without an expression, or with two",
@@ -351,13 +366,16 @@ fn objectives(
         };
         let (text, sign) = text;
         let Some(goal) = goals.read(text, Goal::objective) else { continue };
-        let is_same = |one: &Objective| remove_spaces(one.goal.text()) == remove_spaces(text.value);
-        if goal.is_by_row() && goals.rows > 1 {
-            let title =
-                format!("a number for each row, and every candidate has {} rows", goals.rows);
+        let is_same_objective =
+            |one: &Objective| remove_spaces(one.goal.text()) == remove_spaces(text.value);
+        if goal.is_by_row() && goals.rows_per_candidate > 1 {
+            let title = format!(
+                "a number for each row, and every candidate has {} rows",
+                goals.rows_per_candidate
+            );
             let expected = "expected max(), min(), mean() or quantile() of it";
             root.report.refuse::<()>(&text.location, title, expected);
-        } else if objectives.iter().any(is_same) {
+        } else if objectives.iter().any(is_same_objective) {
             root.report.refuse::<()>(&text.location, "an objective twice", "expected each once");
         } else {
             let name = unique_name(&column_name(text.value), &objectives, parameters);
@@ -374,14 +392,14 @@ fn remove_spaces(text: &str) -> String {
 
 /// Returns a column's name for an expression: its words, with operators spelled out.
 fn column_name(text: &str) -> String {
-    const OPERATORS: [(&str, &str); 6] =
+    const OPERATOR_WORDS: [(&str, &str); 6] =
         [("+", "plus"), ("-", "minus"), ("*", "times"), ("/", "over"), ("<", "lt"), (">", "gt")];
     let mut spelled_out = text.to_owned();
-    for (operator, word) in OPERATORS {
+    for (operator, word) in OPERATOR_WORDS {
         spelled_out = spelled_out.replace(operator, &format!(" {word} "));
     }
-    let words = spelled_out.split(|c: char| !c.is_alphanumeric() && c != '_');
-    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+    let name_words = spelled_out.split(|c: char| !c.is_alphanumeric() && c != '_');
+    name_words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
 /// Returns the first of `name`, `objective_name`, `objective_name_2`, ... that no other column of
@@ -394,8 +412,12 @@ fn unique_name(name: &str, objectives: &[Objective], parameters: &[String]) -> S
             || objectives.iter().any(|objective| objective.name == name)
     };
     let numbered_names = (2..).map(|number| format!("objective_{name}_{number}"));
-    let unnumbered = [name.to_owned(), format!("objective_{name}")];
-    unnumbered.into_iter().chain(numbered_names).find(|name| !is_taken(name)).unwrap_or_default()
+    let unnumbered_names = [name.to_owned(), format!("objective_{name}")];
+    unnumbered_names
+        .into_iter()
+        .chain(numbered_names)
+        .find(|name| !is_taken(name))
+        .unwrap_or_default()
 }
 
 /// The context in which expressions are read.
@@ -403,7 +425,7 @@ struct GoalReader<'a> {
     /// The columns of rows; some may be missing while the plan has mistakes.
     known_columns: Vec<Column>,
     is_plan_valid: bool,
-    rows: u64,
+    rows_per_candidate: u64,
     text: &'a str,
     report: &'a Report,
 }

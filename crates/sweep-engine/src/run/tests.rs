@@ -52,11 +52,11 @@ fn run_job(
 fn run_options(threads: usize) -> RunOptions<'static> {
     RunOptions {
         threads,
-        fresh: false,
+        starts_over: false,
         shard: None,
         progress: ProgressMode::None,
         environment: &|_| None,
-        tell: &|_| {},
+        show_message: &|_| {},
     }
 }
 

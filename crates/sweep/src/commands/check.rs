@@ -53,7 +53,7 @@ pub(crate) fn run(args: &WasherCheckArgs) -> Result<Exit, Error> {
     let execution =
         Execution { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
     let Some(outcomes) = trial.compute_outcomes(execution)? else {
-        return Ok(Exit::interrupted(interrupt.signal()));
+        return Ok(Exit::from_signal(interrupt.signal()));
     };
     show(&trial.format_table(&outcomes))
 }

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let Some(mut fit_result) = fit_result else {
         let kept = "with --out, its evaluations are kept";
         tell(&format!("interrupted: {kept}\n     go on  {}", resume_command()));
-        return Ok(Exit::interrupted(interrupt.signal()));
+        return Ok(Exit::from_signal(interrupt.signal()));
     };
     if let (Some(path), Some(out)) = (&args.out, out) {
         let (machine, _) = fit_result.problem.machine(0, &fit_result.x);

@@ -11,7 +11,7 @@ use crate::stability::{HeldPlan, check_axes};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{
-    RunCommand, RunControlArgs, count_lines, exit_code, failure_reasons, install_interrupt,
+    RunCommand, RunControlArgs, exit_code, format_counts, format_failure_reasons, install_interrupt,
 };
 use sweep_engine::commands::{merge, status};
 use sweep_engine::store::Tally;
@@ -84,16 +84,16 @@ impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> HeldSpeedArgs<O
         let [speed_options, merge_options] = format_options(speed, search);
         let command = RunCommand {
             name: &plan.name,
-            verb: held_plan.command_name(),
-            rows: "rows",
+            subcommand: held_plan.command_name(),
+            row_noun: "rows",
             target,
             control,
-            options: [&speed_options, &merge_options],
+            further_options: [&speed_options, &merge_options],
         };
         let engine = held_plan.engine()?;
         let add_summary = |text: &mut String, tally: &Tally| {
             text.push_str(&describe_content(&output)?);
-            text.push_str(&failure_reasons(&engine, tally, &job));
+            text.push_str(&format_failure_reasons(&engine, tally, &job));
             text.line("file", output.display());
             text.suggest_command("show", &output);
             Ok(())
@@ -157,7 +157,7 @@ impl JobArgs<merge::MergeArgs> {
         let (job, output, _) = self.options.job(&plan, target);
         let content = |tally: &Tally| match self.options.speed {
             Some(_) => describe_content(&output),
-            None => Ok(count_lines(tally, &job)),
+            None => Ok(format_counts(tally, &job)),
         };
         merge::merge_job(&self.command, &plan.name, &job, &output, &content)
     }

@@ -15,7 +15,7 @@ use crate::dwell::columns as dwell_columns;
 use crate::method::METHODS;
 use arrow_schema::Schema;
 use sweep_engine::Model as _;
-use sweep_engine::columns::declared;
+use sweep_engine::columns::into_declarations;
 use sweep_engine::store::{CellType, DeclaredColumn, Layout};
 use sweep_files::key;
 
@@ -173,7 +173,8 @@ fn columns_page() -> String {
         metrics = join_names(&mut Metric::ALL.iter().map(|metric| metric.name())),
         statuses = join_names(&mut ROW_STATUSES.into_iter()),
     ));
-    let columns = declared(dwell_columns::columns(&Channel::ALL, &Measures::default(), false));
+    let columns =
+        into_declarations(dwell_columns::columns(&Channel::ALL, &Measures::default(), false));
     list_columns(&mut text, &Layout::map(Vec::new(), columns).schema());
     text
 }

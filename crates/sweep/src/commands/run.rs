@@ -62,7 +62,7 @@ pub(crate) fn run(args: &WasherRunArgs) -> Result<Exit, Error> {
         result?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");
-            return Ok(Exit::interrupted(Some(signal)));
+            return Ok(Exit::from_signal(Some(signal)));
         }
         tell(&format!("traces      {}", folder.display()));
     }

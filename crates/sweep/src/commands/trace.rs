@@ -10,7 +10,7 @@ use crate::trace::{
     start_from, trace_in_pool,
 };
 use lane_ode::Cancel;
-use sweep_engine::columns::MODELS;
+use sweep_engine::columns::MODEL_NAMES;
 use sweep_engine::commands::cells::{Lines as _, format_number, format_range, format_table};
 use sweep_engine::commands::grid::quote_for_shell;
 use sweep_engine::{Error, Exit, Interrupt, Job, tell};
@@ -217,7 +217,7 @@ fn summarise_row(
     if row.flag("sensitive") == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
-    let least_gaps = MODELS.map(|model| format_column(&format!("min_gap_{model}_m")));
+    let least_gaps = MODEL_NAMES.map(|model| format_column(&format!("min_gap_{model}_m")));
     let gap_text =
         format!("{} m nonlinear, {} m linear, over the whole run", least_gaps[0], least_gaps[1]);
     text.line("least gap", &gap_text);

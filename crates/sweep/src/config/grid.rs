@@ -4,7 +4,7 @@
 use serde_json::json;
 use sweep_engine::config::grid::refuse_other_kind;
 use sweep_engine::config::section::truncate;
-use sweep_engine::config::source::{read, resolve_beside};
+use sweep_engine::config::source::{read_text_file, resolve_beside};
 use sweep_engine::config::syntax::parse_toml;
 use sweep_engine::config::{
     Diagnostic, Field, Form, Key, KeyWalk, Keys, Location, Report, Section,
@@ -54,7 +54,7 @@ fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
         return Machine::paper();
     }
     let path = resolve_beside(&input.path, name.value);
-    match read(&path) {
+    match read_text_file(&path) {
         Ok(text) => parse_machine(&text, &path.display().to_string(), report),
         Err(error) => {
             let short_path = truncate(&path.display().to_string(), MAX_PATH_CHARS);
@@ -97,9 +97,8 @@ pub(super) fn walk_stability(
         }
         speeds.take_if(|_| held_metric.is_none());
     }
-    let description = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \
-                       \"60:400:1\": those \
-                 of the metrics `growth` and `dwell`";
+    let description = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \"60:400:1\": \
+                       those of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
     let mut text = speeds.as_ref().map(ToString::to_string);
     let field = keys.walk_table(Key::new("stability", ""), |keys| {

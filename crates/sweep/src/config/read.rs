@@ -32,7 +32,7 @@ pub(crate) fn walk_top(washer: &mut Washer, keys: &mut Keys<'_>, input: Option<&
 /// Walks over the criterion in `[reliability]`.
 pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
     let reason = "it belongs at the top of the file, before the first [section]";
-    keys.misplace(&["metrics"], reason);
+    keys.mark_misplaced(&["metrics"], reason);
     let description = "amplitudes by which the models are compared: largest deviations, the same \
                  turn by turn of the drum, or root mean squares";
     let criterion = &mut measures.criterion;

@@ -6,7 +6,7 @@ use crate::model::engine_parameter;
 use std::path::Path;
 
 use sweep_engine::config::form::{NumberArray, describe_parameter};
-use sweep_engine::config::keys::Variants;
+use sweep_engine::config::keys::KeyVariants;
 use sweep_engine::config::source::resolve_beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
 use washer_model::{Machine, MachineParameter, Profile, Range, Spin};
@@ -59,9 +59,9 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         let has_file =
             keys.section().is_some_and(|section| section.key_location(FILE_PROFILE).is_some());
         let is_default = has_file || keys.is_schema();
-        let variants = Variants {
+        let variants = KeyVariants {
             words: profile_variants.into_iter().chain([table_variant, file_variant]).collect(),
-            default: is_default.then_some(table_index + 1),
+            default_index: is_default.then_some(table_index + 1),
             settable_count: table_index,
         };
         let current = match spin {
@@ -85,10 +85,9 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
 /// Walks over the keys of a cycle in a file. The plan has its rows, like those of a table.
 fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     let reason = "the file gives times and speeds";
-    keys.misplace(&["time_s", "speed_rpm", "peak_rpm", "ramp_s"], reason);
+    keys.mark_misplaced(&["time_s", "speed_rpm", "peak_rpm", "ramp_s"], reason);
     let description = "CSV or Parquet file with columns of time and speed and their units, \
-                       relative to \
-                 this file";
+                       relative to this file";
     let mut file_name = String::new();
     let key =
         Key::new(FILE_PROFILE, description).required("a CSV or Parquet file of times and speeds");
@@ -123,8 +122,8 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
 /// Walks over the keys of a peak and a ramp.
 fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     let reason = format!("only the profile \"{TABLE_PROFILE}\" has it, not \"{}\"", profile.name());
-    keys.misplace(&["time_s", "speed_rpm"], &reason);
-    keys.misplace(&["file", "joints"], NEEDS_FILE_PROFILE);
+    keys.mark_misplaced(&["time_s", "speed_rpm"], &reason);
+    keys.mark_misplaced(&["file", "joints"], NEEDS_FILE_PROFILE);
     let Spin::Ramped { profile: spin_profile, peak_rpm, ramp_s } = spin else {
         let title = "the grid's spin is a table, which has no peak and no ramp";
         keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
@@ -152,8 +151,8 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
 
 /// Walks over the keys of a table of times and speeds.
 fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
-    keys.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
-    keys.misplace(&["file", "joints"], NEEDS_FILE_PROFILE);
+    keys.mark_misplaced(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
+    keys.mark_misplaced(&["file", "joints"], NEEDS_FILE_PROFILE);
     let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, PLACEHOLDER) {
         Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
         _ => Default::default(),

@@ -478,8 +478,8 @@ const INSERTIONS: [&str; 24] = [
 fn assert_loads_or_explains(grid_bytes: &[u8]) {
     match load_text(grid_bytes, &[]) {
         Ok(plan) => {
-            for corner in 0..plan.corners() {
-                let input = point_input(&plan, &plan.corner(corner));
+            for corner in 0..plan.corner_count() {
+                let input = point_input(&plan, &plan.corner_values(corner));
                 assert_eq!(input.machine.violations(), []);
                 assert_eq!(input.spin.violations(), []);
             }

@@ -13,7 +13,7 @@ use washer_row::{Criterion, MethodKind};
 use crate::method::{REFERENCE_STEP_RATIO, direct_method};
 use crate::model::Washer;
 use crate::plan::{Plan, point_input, timing, write_axis_values};
-use sweep_engine::config::plan_checks::{check_window, refuse, refuse_step};
+use sweep_engine::config::plan_checks::{check_window, refuse_numbers, step_mistake};
 use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::Steps;
 use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
@@ -45,19 +45,19 @@ const TURN_COUNT_COST: u64 = 50;
 /// the run fails.
 pub(crate) fn check_corners(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
-    let mut input = point_input(plan, &plan.corner(0));
+    let mut input = point_input(plan, &plan.corner_values(0));
     let varying = VaryingParts::new(plan);
     if varying.refuse_too_many_points(draft, &input) {
         return;
     }
     let mut check = CornerCheck { draft, reported_keys: BTreeSet::new(), is_spin_valid: true };
     check.check_corner(&input, VaryingParts::ALL);
-    for corner in 1..plan.corners() {
+    for corner in 1..plan.corner_count() {
         if draft.report.is_full() {
             // The report has as many mistakes as it shows.
             break;
         }
-        write_axis_values(plan, &mut input, &plan.corner(corner));
+        write_axis_values(plan, &mut input, &plan.corner_values(corner));
         check.check_corner(&input, varying);
     }
 }
@@ -99,7 +99,7 @@ impl VaryingParts {
         let cost_per_point = u64::from(self.machine) * elements
             + u64::from(self.spin) * rows
             + u64::from(counts_turns) * rows * TURN_COUNT_COST;
-        let points = draft.plan.corners();
+        let points = draft.plan.corner_count();
         let max_points = MAX_CHECKED_ROWS / cost_per_point.max(1);
         if points <= max_points {
             return false;
@@ -151,7 +151,7 @@ impl CornerCheck<'_> {
         for Violation { title, parameters, expected } in violations {
             let is_certain = !parameters.iter().any(|key| self.draft.report.is_invalid(key));
             if is_certain && self.reported_keys.insert(parameters.clone()) {
-                refuse(self.draft, title, &parameters, &format!("expected {expected}"));
+                refuse_numbers(self.draft, title, &parameters, &format!("expected {expected}"));
             }
         }
     }
@@ -225,8 +225,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         };
         draft.report.push(refusal.with_help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at_corner}: look for a \
-             mistaken mass, \
-             moment of inertia or stiffness{hint}"
+             mistaken mass, moment of inertia or stiffness{hint}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(
@@ -239,7 +238,7 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         } else {
             "; method = \"additive\" takes stiff bearings in longer steps"
         };
-        draft.report.push(refuse_step(draft, title, &expected).with_help(format!(
+        draft.report.push(step_mistake(draft, title, &expected).with_help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
              frequency{at_corner}{hint}"
         )));
@@ -261,7 +260,7 @@ fn highest_of_corners_rad_per_s(
     let plan = &draft.plan;
     let timing = timing(plan);
     let mut highest = 0.0_f64;
-    for values in plan.some_corners() {
+    for values in plan.corners_to_prepare() {
         let PointInput { mut machine, spin, .. } = point_input(plan, &values);
         // The steepest slope of friction bounds the frequency. It holds for a linearisation about
         // rest, without free strokes.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sweep_engine::columns::{MODELS, ResultColumn};
+use sweep_engine::columns::{MODEL_NAMES, ResultColumn};
 use sweep_engine::store::{CellType, PointRows};
 use washer_model::{
     Attractor, AttractorStatus, Attractors, COORDINATES, Channel, MotionKind, Response, STATE_LEN,
@@ -117,12 +117,12 @@ fn count_column(name: &str, description: &str, count: fn(&DwellRow) -> Option<u6
 fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
     let amplitude_kinds: [(&str, &str, fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
         (
-            MODELS[0],
+            MODEL_NAMES[0],
             "largest deviation from equilibrium over the motion's last turns; null where it left \
              the model's range",
             |row| Some(&row.motion_in_range()?.peaks),
         ),
-        (MODELS[1], "the same by the linear model, which repeats every turn", |row| {
+        (MODEL_NAMES[1], "the same by the linear model, which repeats every turn", |row| {
             Some(&row.response()?.linear_peaks)
         }),
         ("periodic", "the same of the nonlinear model's periodic response, stable or not", |row| {
@@ -185,7 +185,7 @@ pub(crate) fn columns(
     for column in measures.model_columns().filter(is_periodic) {
         let description = format!("{}, over 128 further turns of the motion", column.description());
         let description = description.replace(" in the window", "");
-        let name = column.column(MODELS[0]);
+        let name = column.column(MODEL_NAMES[0]);
         let unit = column.metric.properties().unit;
         let value = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra);
         columns.push(ResultColumn::measured(name, unit, description, value));

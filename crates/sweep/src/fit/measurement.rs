@@ -155,8 +155,9 @@ impl Measurement {
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let names = ColumnNames { known: &find_known_name, renamed: names_by_header };
-        let table = NumberTable::read(path, &names, &report);
+        let names =
+            ColumnNames { find_quantity: &find_known_name, renamed_headers: names_by_header };
+        let table = NumberTable::read_point_list(path, &names, &report);
         let measurement = table.map(|table| check_table(name, table, &report));
         report.finish(measurement)
     }
@@ -170,7 +171,8 @@ impl Measurement {
         names_by_header: &[(String, String)],
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let names = ColumnNames { known: &find_known_name, renamed: names_by_header };
+        let names =
+            ColumnNames { find_quantity: &find_known_name, renamed_headers: names_by_header };
         let table = NumberTable::from_columns("table", columns, &names, &report);
         let measurement = check_table("table".to_owned(), table, &report);
         report.finish(Some(measurement))
@@ -305,7 +307,7 @@ fn check_table(name: String, mut table: NumberTable, report: &Report) -> Measure
                 let title = format!("`{name}` is infinite in row {}", row + 1);
                 let expected = "expected a number, or nothing where no sample is";
                 Diagnostic::new(title)
-                    .at_location(&table.locate(sources, column.index, row), expected)
+                    .at_location(&table.locate(sources, column.column_index, row), expected)
             });
         }
         let values = &column.values[first_row_of_run..];
@@ -398,7 +400,7 @@ fn clock_time(
     row: usize,
     report: &Report,
 ) -> Option<String> {
-    let text = table.cell(report, column.index, row).filter(|cell| cell.contains(':'));
+    let text = table.cell(report, column.column_index, row).filter(|cell| cell.contains(':'));
     text.or_else(|| column.clock_time(row))
 }
 
@@ -503,7 +505,9 @@ fn read_pulses(
     };
     report.push_with(|sources| {
         let location = match row {
-            Some(row) => table.locate(sources, column.index, measurement.rows_before_start + row),
+            Some(row) => {
+                table.locate(sources, column.column_index, measurement.rows_before_start + row)
+            }
             None => column.name.location.clone(),
         };
         Diagnostic::new(title).at_location(&location, expected)
@@ -544,7 +548,7 @@ fn check_times(table: &NumberTable, column: &ListColumn, report: &Report) {
         report.push_with(|sources| {
             let expected = "expected times in s that rise from row to row, 0 where the run begins";
             Diagnostic::new(description)
-                .at_location(&table.locate(sources, column.index, row), expected)
+                .at_location(&table.locate(sources, column.column_index, row), expected)
         });
     }
     if reported_mistakes == [false; 4] {
@@ -578,7 +582,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
              convert its times to s"
         );
         Diagnostic::new(title)
-            .at_location(&table.locate(sources, column.index, run_start + row), expected)
+            .at_location(&table.locate(sources, column.column_index, run_start + row), expected)
     });
 }
 

@@ -138,7 +138,7 @@ impl<'a> BatchCollector<'a> {
         let rows = BATCH_ROWS as u64;
         let batch_index = outcome.point / rows;
         let size = rows.min(self.job.points - batch_index * rows);
-        if let Some(outcomes) = self.incomplete_batches.add(batch_index, size, outcome) {
+        if let Some(outcomes) = self.incomplete_batches.add_result(batch_index, size, outcome) {
             let batch = self.build_batch(outcomes);
             lock(&self.batches).insert(batch_index, batch);
         }

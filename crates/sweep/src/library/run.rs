@@ -43,11 +43,11 @@ impl EvaluationTask<'_> {
     ) -> Result<FileRunEnd, Error> {
         let options = RunOptions {
             threads: execution.threads()?,
-            fresh,
+            starts_over: fresh,
             shard: None,
             progress: execution.progress,
             environment: &|_| None,
-            tell,
+            show_message: tell,
         };
         let report = runner::run(&self.engine, &self.job, output, options, execution.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));

@@ -26,7 +26,7 @@ impl FromStr for FailOn {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || {
+        let expected_values = || {
             "expected any, plan, rows, flips, lost, sensitive, ratio=PART, gap=M, boundary=WIDTH \
              or COLUMN=CHANGE"
                 .to_owned()
@@ -51,9 +51,11 @@ impl FromStr for FailOn {
             ("ratio", _) => Ok(Self::Ratio(number()?)),
             ("gap", _) => Ok(Self::Gap(number()?)),
             ("boundary", _) => Ok(Self::Boundary(number()?)),
-            ("any" | "plan" | "rows" | "flips" | "lost" | "sensitive" | "", _) => Err(expected()),
+            ("any" | "plan" | "rows" | "flips" | "lost" | "sensitive" | "", _) => {
+                Err(expected_values())
+            }
             (column, Some(_)) => Ok(Self::Column(column.to_owned(), number()?)),
-            _ => Err(expected()),
+            _ => Err(expected_values()),
         }
     }
 }
@@ -61,12 +63,12 @@ impl FromStr for FailOn {
 impl FailOn {
     /// Returns the name of the check and the kind of files that it needs, if the compared files are
     /// of another kind. In such files the check would never fail.
-    pub(super) fn unmet_need(
+    pub(super) fn find_unmet_need(
         &self,
         comparison: &Comparison,
         tables: &[ResultTable; 2],
     ) -> Option<[&str; 2]> {
-        let (is_met, need) = match self {
+        let (is_met, name_and_need) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
             Self::Flips => (comparison.has_verdicts, ["flips", "two files with verdicts"]),
             Self::Lost => (comparison.has_verdicts, ["lost", "two files with verdicts"]),
@@ -77,18 +79,19 @@ impl FailOn {
                 (comparison.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
             }
             Self::Column(name, _) => {
-                let is_number = |table: &ResultTable| {
+                let is_number_column = |table: &ResultTable| {
                     table.column(name).is_some_and(|column| column.kind == CellKind::Number)
                 };
-                let is_compared = tables.iter().all(is_number) && !comparison.keys.contains(name);
+                let is_compared =
+                    tables.iter().all(is_number_column) && !comparison.keys.contains(name);
                 (is_compared, [name.as_str(), "a column of numbers in both files that is no axis"])
             }
         };
-        (!is_met).then_some(need)
+        (!is_met).then_some(name_and_need)
     }
 
     /// Describes the forbidden differences between the files; `None` if there are none.
-    pub(super) fn violation(&self, comparison: &Comparison) -> Option<String> {
+    pub(super) fn describe_violation(&self, comparison: &Comparison) -> Option<String> {
         let insensitive_rows = || comparison.shared_rows.iter().filter(|row| !row.is_sensitive);
         let format_count =
             |noun: &str, count: usize| (count > 0).then(|| format!("{noun}: {count}"));
@@ -113,13 +116,16 @@ impl FailOn {
                 let worst =
                     column.worst_rows.first().filter(|worst| worst.deviation() > *max_change)?;
                 let unit = column.unit.as_str();
-                let change = match worst.deviation() {
+                let change_text = match worst.deviation() {
                     deviation if deviation.is_finite() => {
                         format!("changed by up to {}", format_number(deviation))
                     }
                     _ => "came or went".to_owned(),
                 };
-                Some(format!("{name} {change} {unit}, and may by {}", format_number(*max_change)))
+                Some(format!(
+                    "{name} {change_text} {unit}, and may by {}",
+                    format_number(*max_change)
+                ))
             }
             Self::Ratio(max_change) => {
                 let percent = format_number(100.0 * max_change);
@@ -130,8 +136,9 @@ impl FailOn {
                 )
             }
             Self::Gap(max_change) => {
-                let max_change_m = format_number(*max_change);
-                let noun = format!("gaps that changed by more than {max_change_m} m, came or went");
+                let max_change_text = format_number(*max_change);
+                let noun =
+                    format!("gaps that changed by more than {max_change_text} m, came or went");
                 format_count(
                     &noun,
                     insensitive_rows().filter(|row| row.gap_deviation_m() > *max_change).count(),
@@ -139,7 +146,7 @@ impl FailOn {
             }
             Self::Boundary(max_change) => {
                 let shift = comparison.boundary.as_ref()?;
-                let shifted = shift
+                let shifted_crossings = shift
                     .crossings
                     .iter()
                     .filter(|crossing| crossing.certain_shift() > *max_change);
@@ -148,7 +155,10 @@ impl FailOn {
                     format_number(*max_change),
                     shift.unit
                 );
-                format_count(noun.trim_end(), shifted.count() + shift.unmatched_lines.len())
+                format_count(
+                    noun.trim_end(),
+                    shifted_crossings.count() + shift.unmatched_lines.len(),
+                )
             }
         }
     }

@@ -22,17 +22,18 @@ pub(super) fn find_overridden<M: Model>(
 ) -> Vec<OverriddenNumbers> {
     let plans = tables.each_ref().map(|table| table.plan.as_ref());
     let [Some(first), Some(second)] = plans else { return Vec::new() };
-    let [Some(first_model), Some(second_model)] = [first, second].map(without_axes::<M>) else {
+    let [Some(first_model), Some(second_model)] = [first, second].map(read_plan_without_axes::<M>)
+    else {
         return Vec::new();
     };
     let changes_before = plan_changes(&first_model.to_json(), &second_model.to_json());
     let second_axes = overriding_axes(second);
     let shared_axes = overriding_axes(first).into_iter().filter(|name| second_axes.contains(name));
-    let by_axis = shared_axes.filter_map(|name| {
+    let overridden_by_axis = shared_axes.filter_map(|name| {
         // Both plans get the same number from the axis, so that any number serves here.
         let value = first_model.model.find(name).ok()?.value.unwrap_or(1.0);
         let [first, second] =
-            [&first_model, &second_model].map(|plan| with_number(plan, name, value));
+            [&first_model, &second_model].map(|plan| plan_with_number(plan, name, value));
         let changes_after = plan_changes(&first?.to_json(), &second?.to_json());
         let contains_path =
             |changes: &[PlanChange], path: &str| changes.iter().any(|change| change.path == path);
@@ -45,11 +46,11 @@ pub(super) fn find_overridden<M: Model>(
             .collect();
         (!paths.is_empty()).then(|| OverriddenNumbers { axis: name.to_owned(), paths })
     });
-    by_axis.collect()
+    overridden_by_axis.collect()
 }
 
 /// Reads the plan of a result, without its axes; `None` if this version does not read it.
-fn without_axes<M: Model>(plan: &Value) -> Option<Plan<M>> {
+fn read_plan_without_axes<M: Model>(plan: &Value) -> Option<Plan<M>> {
     let mut plan = plan.clone();
     plan.as_object_mut()?.remove("axis");
     GridInput::from_plan("plan", &plan).load().ok()
@@ -63,7 +64,7 @@ fn overriding_axes(plan: &Value) -> Vec<&str> {
 }
 
 /// Returns a plan with another value of a parameter.
-fn with_number<M: Model>(plan: &Plan<M>, name: &str, value: f64) -> Option<Plan<M>> {
+fn plan_with_number<M: Model>(plan: &Plan<M>, name: &str, value: f64) -> Option<Plan<M>> {
     let parameter = plan.model.find(name).ok()?;
     let mut plan = plan.clone();
     plan.write(&parameter, value);

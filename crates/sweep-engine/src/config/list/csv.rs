@@ -30,7 +30,7 @@ const MISSING_VALUE_TEXTS: [&str; 9] =
     ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
 
 /// Reads a text; mistakes are reported.
-pub(super) fn read(
+pub(super) fn read_text_table(
     text: &str,
     source: SourceId,
     allows_missing: bool,
@@ -60,13 +60,14 @@ pub(super) fn read(
         unit_scales.push(unit_scale);
     }
     let rows = data_lines(text, layout.rows_start);
-    let notation = match layout.notation.map_or_else(|| detect_notation(rows.clone(), &table), Ok) {
-        Ok(notation) => notation,
-        Err(unclear) => {
-            report.push(notation_mistake(&unclear, source));
-            return Ok(table);
-        }
-    };
+    let notation =
+        match layout.stated_notation.map_or_else(|| detect_notation(rows.clone(), &table), Ok) {
+            Ok(notation) => notation,
+            Err(unclear) => {
+                report.push(notation_mistake(&unclear, source));
+                return Ok(table);
+            }
+        };
     for line in rows {
         let cells = line.cells(separator);
         let cell_count = cells.clone().count();
@@ -87,7 +88,7 @@ pub(super) fn read(
         }
         check_size(table.row_starts.len() as u64 + 1, column_count)?;
         // The cast loses nothing, because a list is smaller than 4 GiB.
-        table.row_starts.push(line.start as u32);
+        table.row_starts.push(line.line_start as u32);
         for (((cell, location), column), unit_scale) in
             cells.zip(&mut table.columns).zip(&unit_scales)
         {
@@ -157,7 +158,7 @@ fn create_column(
     let make_column = |name: String, is_known| ListColumn {
         name: Located { value: name, location: location.clone() },
         header: header.to_owned(),
-        index,
+        column_index: index,
         is_known,
         values: Vec::new(),
         is_clock: false,
@@ -188,7 +189,7 @@ fn row_length_mistake(
     separator: char,
     source: SourceId,
 ) -> Diagnostic {
-    let location = Location::new(source, line.offset..line.offset + line.text.len());
+    let location = Location::new(source, line.text_start..line.text_start + line.text.len());
     let [names, numbers] = ["name", "number"].map(|noun| format_count(column_count, noun));
     let title = format!("a row of {} under {names}", format_count(cell_count, "number"));
     let expected = format!("expected {numbers}, separated by {}", separator_words(separator));

@@ -28,11 +28,11 @@ pub(super) fn separator_words(separator: char) -> &'static str {
 #[derive(Clone, Copy)]
 pub(super) struct TextLine<'t> {
     /// The byte at which the line begins.
-    pub(super) start: usize,
+    pub(super) line_start: usize,
     /// The text without byte order mark and line end.
     pub(super) text: &'t str,
     /// The byte at which `text` begins.
-    pub(super) offset: usize,
+    pub(super) text_start: usize,
 }
 
 impl<'t> TextLine<'t> {
@@ -43,7 +43,11 @@ impl<'t> TextLine<'t> {
         let line_body = line.trim_end_matches(['\n', '\r']);
         let line_text =
             if start == 0 { line_body.trim_start_matches('\u{feff}') } else { line_body };
-        Self { start, text: line_text, offset: start + line_body.len() - line_text.len() }
+        Self {
+            line_start: start,
+            text: line_text,
+            text_start: start + line_body.len() - line_text.len(),
+        }
     }
 
     /// Yields the cells of the line without white space and quotation marks, with their positions.
@@ -92,7 +96,7 @@ impl<'t> Iterator for LineCells<'t> {
         let end = end_of_cell(rest_of_line, self.separator);
         self.next = (end < rest_of_line.len()).then_some(from + end + 1);
         let cell = &rest_of_line[..end];
-        let start = self.line.offset + from + (cell.len() - cell.trim_start().len());
+        let start = self.line.text_start + from + (cell.len() - cell.trim_start().len());
         let trimmed_cell = cell.trim();
         let is_quoted =
             trimmed_cell.len() >= 2 && trimmed_cell.starts_with('"') && trimmed_cell.ends_with('"');
@@ -128,7 +132,7 @@ pub(super) struct TableLayout<'t> {
     /// The units of the columns in order; shorter if some have none.
     pub(super) units: Vec<String>,
     /// The decimal mark that the file states.
-    pub(super) notation: Option<Notation>,
+    pub(super) stated_notation: Option<Notation>,
     /// The byte at which the rows begin.
     pub(super) rows_start: usize,
     /// Whether it is a LabVIEW file: the first column is the time, and the last one holds remarks,
@@ -207,7 +211,7 @@ impl<'t> TableLayout<'t> {
             separator,
             header,
             units: units.unwrap_or_default(),
-            notation: None,
+            stated_notation: None,
             rows_start: end_of_line(text, last_header_line),
             is_labview: false,
             preamble_lines: header_index,
@@ -266,7 +270,7 @@ impl<'t> TableLayout<'t> {
             separator,
             header,
             units,
-            notation: Some(notation),
+            stated_notation: Some(notation),
             rows_start,
             is_labview: true,
             preamble_lines: header_end + 1,
@@ -281,12 +285,12 @@ fn find_commented_header<'t>(
     row: TextLine<'t>,
     separator: &dyn Fn(&TextLine<'_>) -> char,
 ) -> Option<TableLayout<'t>> {
-    let preceding_text = text[..row.start].trim_end();
+    let preceding_text = text[..row.line_start].trim_end();
     let start = preceding_text.rfind('\n').map_or(0, |end| end + 1);
     let line = TextLine::at(text, start);
     let name_text = line.text.trim_start().strip_prefix('#')?;
-    let offset = line.offset + line.text.len() - name_text.len();
-    let header = TextLine { start, text: name_text, offset };
+    let offset = line.text_start + line.text.len() - name_text.len();
+    let header = TextLine { line_start: start, text: name_text, text_start: offset };
     let separator = separator(&header);
     let column_count = split_cells(header, separator)?.len();
     let row_cells = split_cells(row, separator)?;
@@ -295,8 +299,8 @@ fn find_commented_header<'t>(
         separator,
         header,
         units: Vec::new(),
-        notation: None,
-        rows_start: row.start,
+        stated_notation: None,
+        rows_start: row.line_start,
         is_labview: false,
         preamble_lines: 0,
     })
@@ -311,8 +315,8 @@ fn split_cells(line: TextLine<'_>, separator: char) -> Option<Vec<&str>> {
 
 /// Returns the byte after a line.
 fn end_of_line(text: &str, line: TextLine<'_>) -> usize {
-    let end = text[line.start..].find('\n');
-    end.map_or(text.len(), |end| line.start + end + 1)
+    let end = text[line.line_start..].find('\n');
+    end.map_or(text.len(), |end| line.line_start + end + 1)
 }
 
 /// Returns the separator that a first line `sep=;` states, a convention of Excel.

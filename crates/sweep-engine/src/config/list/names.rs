@@ -12,9 +12,9 @@ pub const ANY_UNIT: &str = "any unit";
 pub struct ColumnNames<'a> {
     /// The function that returns the name and the unit of the quantity that a text names, if the
     /// reader knows it.
-    pub known: &'a dyn Fn(&str) -> Option<(String, String)>,
+    pub find_quantity: &'a dyn Fn(&str) -> Option<(String, String)>,
     /// Headers of the file with the names that the user gives them.
-    pub renamed: &'a [(String, String)],
+    pub renamed_headers: &'a [(String, String)],
 }
 
 /// A known column.
@@ -46,8 +46,8 @@ impl ColumnNames<'_> {
             let header_text = header_text.trim();
             header_text == header || header_text == stem
         };
-        if let Some((_, name)) = self.renamed.iter().find(is_renamed_header) {
-            let Some((name, unit_of_name)) = (self.known)(name) else {
+        if let Some((_, name)) = self.renamed_headers.iter().find(is_renamed_header) {
+            let Some((name, unit_of_name)) = (self.find_quantity)(name) else {
                 let title =
                     format!("the column `{}` is called `{}`", shorten(header), shorten(name));
                 return Err([title, "expected a name of what is read here".to_owned()]);
@@ -55,11 +55,11 @@ impl ColumnNames<'_> {
             return match_with_scale(header, name, unit, &unit_of_name).map(Some);
         }
         let stem = normalise_header(stem);
-        let exact_match = (self.known)(header).or_else(|| (self.known)(&stem));
+        let exact_match = (self.find_quantity)(header).or_else(|| (self.find_quantity)(&stem));
         let find_by_unit = || {
             let candidate_names =
                 unit_suffixes(unit?).into_iter().map(|suffix| format!("{stem}_{suffix}"));
-            candidate_names.filter_map(|name| (self.known)(&name)).next()
+            candidate_names.filter_map(|name| (self.find_quantity)(&name)).next()
         };
         if let Some((name, unit_of_name)) = exact_match {
             let match_result = match_with_scale(header, name, unit, &unit_of_name);
@@ -94,7 +94,7 @@ impl ColumnNames<'_> {
             let candidate_names =
                 unit_suffixes(&written_unit).into_iter().map(|suffix| format!("{stem}_{suffix}"));
             if let Some((name, unit_of_name)) =
-                candidate_names.filter_map(|name| (self.known)(&name)).next()
+                candidate_names.filter_map(|name| (self.find_quantity)(&name)).next()
             {
                 return match_with_scale(header, name, Some(&written_unit), &unit_of_name)
                     .map(Some);
@@ -179,7 +179,7 @@ mod tests {
             found.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
         };
         let renamed = [("Acc front".to_owned(), "arm_end_y_m_per_s2".to_owned())];
-        let candidate_names = ColumnNames { known: &known, renamed: &renamed };
+        let candidate_names = ColumnNames { find_quantity: &known, renamed_headers: &renamed };
         let found = candidate_names.find(header, unit)?;
         Ok(found.map(|found| (found.name, found.scale.apply(1.0))))
     }

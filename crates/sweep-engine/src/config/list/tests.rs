@@ -13,8 +13,10 @@ use super::*;
 const MASS_COLUMN: &str = "unbalance_mass_kg";
 
 /// Names that are all known and have no unit.
-const ALL_NAMES_KNOWN: ColumnNames<'_> =
-    ColumnNames { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
+const ALL_NAMES_KNOWN: ColumnNames<'_> = ColumnNames {
+    find_quantity: &|name: &str| Some((name.to_owned(), String::new())),
+    renamed_headers: &[],
+};
 
 /// Returns the known columns of a Parquet file.
 fn read_parquet(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, ListError> {
@@ -151,7 +153,7 @@ fn cell_span(text: &str, start: usize, separator: char, column: usize) -> std::o
 fn read_csv(text: &str) -> Result<csv::TextTable, ListError> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    csv::read(text, source, false, &ALL_NAMES_KNOWN, &report)
+    csv::read_text_table(text, source, false, &ALL_NAMES_KNOWN, &report)
 }
 
 #[test]
@@ -170,7 +172,7 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
-    assert!(csv::read(&text, source, false, &ALL_NAMES_KNOWN, &report).is_ok());
+    assert!(csv::read_text_table(&text, source, false, &ALL_NAMES_KNOWN, &report).is_ok());
     assert_eq!(report.into_diagnostics().count(), 1);
 }
 
@@ -213,7 +215,7 @@ fn semicolons_tabs_and_decimal_commas_are_read() {
     }
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    assert!(csv::read("a;b\n1;2;3\n", source, false, &ALL_NAMES_KNOWN, &report).is_ok());
+    assert!(csv::read_text_table("a;b\n1;2;3\n", source, false, &ALL_NAMES_KNOWN, &report).is_ok());
     let message = report.into_diagnostics().to_string();
     assert!(message.contains("expected 2 numbers, separated by semicolons"), "{message}");
 }
@@ -232,7 +234,7 @@ fn a_file_has_one_decimal_mark() {
     let mistakes_of = |text: &str| {
         let report = Report::default();
         let source = report.add("list.csv", String::new());
-        let table = csv::read(text, source, true, &ALL_NAMES_KNOWN, &report);
+        let table = csv::read_text_table(text, source, true, &ALL_NAMES_KNOWN, &report);
         report.set_text(source, text.to_owned());
         assert!(table.unwrap().columns.iter().all(|column| column.values.is_empty()));
         report.into_diagnostics().to_string()
@@ -257,12 +259,12 @@ fn read_logger_file(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
         known_quantity.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
     };
     let renamed = [("Acc front".to_owned(), "acc_m_per_s2".to_owned())];
-    let column_names = ColumnNames { known: &known, renamed: &renamed };
+    let column_names = ColumnNames { find_quantity: &known, renamed_headers: &renamed };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("logger.csv");
     std::fs::write(&path, bytes).unwrap();
     let report = Report::default();
-    let table = NumberTable::read(&path, &column_names, &report);
+    let table = NumberTable::read_point_list(&path, &column_names, &report);
     let Some(table) = table else { panic!("{}", report.into_diagnostics()) };
     let notes = table.notes();
     let known = table.columns.into_iter().filter(|column| column.is_known);
@@ -353,7 +355,7 @@ fn index_and_unknown_columns_of_parquet_lists_are_ignored() {
     let bytes = parquet_file(&columns, 1, WriterProperties::default());
     let known =
         |name: &str| (name == MASS_COLUMN).then(|| (MASS_COLUMN.to_owned(), "kg".to_owned()));
-    let names = ColumnNames { known: &known, renamed: &[] };
+    let names = ColumnNames { find_quantity: &known, renamed_headers: &[] };
     let columns_read = parquet::read_columns(bytes, false, &names).unwrap();
     assert_eq!(
         (columns_read[0].name.as_str(), columns_read[0].values.as_deref()),
@@ -406,7 +408,7 @@ fn instants_and_times_of_day_of_parquet_files_are_seconds() {
         };
         Some(name_and_unit.map(str::to_owned).into())
     };
-    let names = ColumnNames { known: &known, renamed: &[] };
+    let names = ColumnNames { find_quantity: &known, renamed_headers: &[] };
     let read_time_columns = |name: &str, column_type: &str, cells: &[i64]| {
         let schema = format!(
             "message m {{ required int64 {name} {column_type}; \

@@ -44,8 +44,11 @@ pub(super) fn read(
     location: &Location,
     report: &Report,
 ) -> Option<CyclePoints> {
-    let table =
-        NumberTable::read(path, &ColumnNames { known: &quantity_and_unit, renamed: &[] }, report)?;
+    let table = NumberTable::read_point_list(
+        path,
+        &ColumnNames { find_quantity: &quantity_and_unit, renamed_headers: &[] },
+        report,
+    )?;
     table.notes().into_iter().for_each(|note| report.add_note(format!("the cycle: {note}")));
     let times = find_column(&table, "time_s", "time", location, report);
     let speeds = find_column(&table, "speed_rpm", "speed", location, report);
@@ -122,7 +125,7 @@ fn check_columns(
 ) -> bool {
     let refuse = |column: &ListColumn, row: usize, title: String, expected: &str| {
         report.push_with(|sources| {
-            let at = table.locate(sources, column.index, row);
+            let at = table.locate(sources, column.column_index, row);
             Diagnostic::new(title).at_location(&at, expected)
         });
     };

@@ -44,7 +44,7 @@ fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
     axis_texts.push_str(&axis_text("damping_n_s_per_m"));
     axis_texts.push_str(&axis_text("spin_table_2_speed_rpm"));
     let plan = load_text(grid_with_table(spin::MAX_TABLE_ROWS, &axis_texts), &[]).unwrap();
-    assert_eq!(plan.corners(), 64);
+    assert_eq!(plan.corner_count(), 64);
     let refusal =
         load_text(grid_with_table(spin::MAX_TABLE_ROWS + 1, &axis_texts), &[]).unwrap_err();
     assert!(refusal.contains("`time_s` has 20001 numbers"), "{refusal}");
@@ -59,7 +59,7 @@ fn a_list_of_millions_of_points_is_checked() {
     list_text.push_str(&"0.1,1e0\n".repeat(3_000_000));
     let plan = load_list(MINIMAL_GRID, &list_text).unwrap();
     assert_eq!(plan.points(), 3_000_000);
-    assert!((250..=256).contains(&plan.some_corners().len()));
+    assert!((250..=256).contains(&plan.corners_to_prepare().len()));
     list_text.push_str("0.1,0\n");
     let refusal = load_list(MINIMAL_GRID, &list_text).unwrap_err();
     assert!(refusal.contains("points.csv:3000002:5"), "{refusal}");
@@ -76,7 +76,7 @@ fn extreme_points_of_a_long_list_are_corners() {
             _ => "2e8,4\n",
         });
     }
-    let corners = load_list(MINIMAL_GRID, &list_text).unwrap().some_corners();
+    let corners = load_list(MINIMAL_GRID, &list_text).unwrap().corners_to_prepare();
     assert!(corners.contains(&vec![5e10, 4.0]) && corners.contains(&vec![2e8, 0.5]), "{corners:?}");
 }
 
