@@ -57,7 +57,7 @@ fn check_plan(plan: &Plan) {
     let end_s = END_S.min(plan.end_s);
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     let mut instruction_sets = Simd::ALL.into_iter();
-    let simd = instruction_sets.find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
+    let simd = instruction_sets.find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::widest);
     let prepared = prepare(simd, &machines, &timing);
     let points: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {

@@ -108,12 +108,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         let error = joint_error(n5, n3);
         start_state = *start;
         start_slope = slopes[0];
-        let accepted = error.0.less(zero.lit(1.0).0);
+        let accepted_lanes = error.0.less(zero.lit(1.0).0);
         for i in 0..D {
             states[START_STATE][i] =
-                N(T::select(accepted, states[END_STATE][i].0, states[START_STATE][i].0));
+                N(T::select(accepted_lanes, states[END_STATE][i].0, states[START_STATE][i].0));
         }
-        length_s = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
+        length_s = lanes.accept_or_reject(h, error, [accepted_lanes, in_range], tolerance);
     }
 }
 
@@ -123,6 +123,6 @@ fn joint_error<T: Lane>(n5: N<T>, n3: N<T>) -> N<T> {
     let squared_5 = (n5 * n5).v();
     let squared_3 = (n3 * n3).v();
     // The least positive number prevents the quotient of two zeros.
-    let sum = squared_3 * 0.01 + squared_5 + n5.lit(f64::MIN_POSITIVE);
-    squared_5 / sum.sqrt()
+    let square_sum = squared_3 * 0.01 + squared_5 + n5.lit(f64::MIN_POSITIVE);
+    squared_5 / square_sum.sqrt()
 }

@@ -97,13 +97,13 @@ impl<T: Lane> FixedSegments<T> {
         active_lanes.map(|lane| lane.remaining_steps.min(CANCEL_POLL_STEPS)).min()
     }
 
-    /// Ends the segments of lanes that are out of range at `time`, `new_steps` steps after the last
-    /// call of [`Self::start_pending_lanes`]. Returns whether any lane's segment has ended.
+    /// Ends the segments of lanes that are out of range at `times_s`, `new_steps` steps after the
+    /// last call of [`Self::start_pending_lanes`]. Returns whether any lane's segment has ended.
     #[inline(always)]
     pub(crate) fn end_failed_segments(
         &mut self,
         in_range: T::Mask,
-        time: N<T>,
+        times_s: N<T>,
         new_steps: u64,
     ) -> bool {
         let out_of_range = !T::bits(in_range);
@@ -115,7 +115,7 @@ impl<T: Lane> FixedSegments<T> {
                 + new_steps;
             self.segment_ends[lane] = Some(SegmentEnd::Failed {
                 reason: Failure::Diverged,
-                time_s: time.0.get(lane),
+                time_s: times_s.0.get(lane),
                 count: StepCount { accepted: accepted_steps, rejected: 0 },
             });
         }

@@ -111,7 +111,7 @@
 //! }
 //!
 //! let stiffness: Vec<f64> = (1..=20).map(f64::from).collect();
-//! let ends = Simd::best().dispatch(Run(&stiffness));
+//! let ends = Simd::widest().dispatch(Run(&stiffness));
 //! for (k, x) in stiffness.iter().zip(&ends) {
 //!     assert!((x - k.sqrt().cos()).abs() < 1e-6, "k = {k}: {x}");
 //! }

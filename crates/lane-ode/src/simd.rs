@@ -67,7 +67,7 @@ impl Simd {
     }
 
     /// Returns the widest instruction set that this processor has.
-    pub fn best() -> Self {
+    pub fn widest() -> Self {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 

@@ -206,13 +206,13 @@ impl<T: Lane, const D: usize> ObservedStep<'_, T, D> {
         let mut x = *self.start_state;
         for i in 0..D {
             let difference = self.end_state[i] - self.start_state[i];
-            let start = self.length_s * self.start_slope[i] - difference;
-            let end = difference - self.length_s * self.end_slope[i] - start;
+            let start_term = self.length_s * self.start_slope[i] - difference;
+            let end_term = difference - self.length_s * self.end_slope[i] - start_term;
             let curvature_term = match self.dense_term {
-                Some(dense) => end + remainder * dense[i],
-                None => end,
+                Some(dense) => end_term + remainder * dense[i],
+                None => end_term,
             };
-            x[i] += s * (difference + remainder * (start + s * curvature_term));
+            x[i] += s * (difference + remainder * (start_term + s * curvature_term));
         }
         x
     }

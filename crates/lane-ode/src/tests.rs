@@ -59,9 +59,9 @@ enum TestMethod {
 #[derive(Clone, Copy, Debug)]
 struct TestOutcome<const D: usize> {
     /// The end of the last segment.
-    end: SegmentEnd,
+    segment_end: SegmentEnd,
     /// The steps of all segments.
-    count: StepCount,
+    step_count: StepCount,
     /// The state at the end.
     x: [f64; D],
     /// The end of the last step that an observer received.
@@ -72,8 +72,8 @@ struct TestOutcome<const D: usize> {
 
 impl<const D: usize> TestOutcome<D> {
     const EMPTY_OUTCOME: Self = Self {
-        end: SegmentEnd::Idle,
-        count: StepCount { accepted: 0, rejected: 0 },
+        segment_end: SegmentEnd::Idle,
+        step_count: StepCount { accepted: 0, rejected: 0 },
         x: [f64::NAN; D],
         observed_to_s: f64::NAN,
         error_inside: 0.0,
@@ -82,8 +82,8 @@ impl<const D: usize> TestOutcome<D> {
     /// Returns whether both trajectories have the same bits and the same steps.
     fn is_same(&self, other: &Self) -> bool {
         self.x.map(f64::to_bits) == other.x.map(f64::to_bits)
-            && self.end == other.end
-            && self.count == other.count
+            && self.segment_end == other.segment_end
+            && self.step_count == other.step_count
             && self.error_inside.to_bits() == other.error_inside.to_bits()
             && self.observed_to_s.to_bits() == other.observed_to_s.to_bits()
     }
@@ -202,19 +202,24 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
         &self.test_system
     }
 
-    fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
-        if end != SegmentEnd::Idle {
+    fn next_segment(
+        &mut self,
+        lane: usize,
+        segment_end: SegmentEnd,
+        x: &mut [N<T>; D],
+    ) -> Option<Segment> {
+        if segment_end != SegmentEnd::Idle {
             let (trajectory, segment) = &mut self.current_segments[lane];
             let segments = &self.trajectories[*trajectory].segments;
             let outcome = &mut self.outcomes[*trajectory];
-            outcome.end = end;
-            match end {
+            outcome.segment_end = segment_end;
+            match segment_end {
                 SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } => {
                     outcome.count.add(count);
                 }
                 SegmentEnd::Idle => {}
             }
-            if matches!(end, SegmentEnd::Completed(_)) && *segment + 1 < segments.len() {
+            if matches!(segment_end, SegmentEnd::Completed(_)) && *segment + 1 < segments.len() {
                 *segment += 1;
                 return Some(segments[*segment]);
             }
@@ -308,8 +313,8 @@ impl Equation<4, 1> for CoupledEquation {
         r: &[N<T>; 4],
         g: N<T>,
     ) -> [N<T>; 4] {
-        let stretch = r[1] - r[0] + g * (r[3] - r[2] + g * x[0]);
-        let pull = (k * stretch).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
+        let spring_stretch = r[1] - r[0] + g * (r[3] - r[2] + g * x[0]);
+        let pull = (k * spring_stretch).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
         let accelerations = [pull - x[0], -pull];
         [
             r[2] + g * accelerations[0],

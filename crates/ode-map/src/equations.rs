@@ -39,12 +39,12 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
         p: [f64; P],
         window_s: [f64; 2],
     ) -> Option<Self> {
-        let rest = [0.0; C];
-        let mut equilibrium = rest;
-        let mut tangent = compute_tangent::<O, C, D, P>(&p, &rest, &rest);
+        let zero_state = [0.0; C];
+        let mut equilibrium = zero_state;
+        let mut tangent = compute_tangent::<O, C, D, P>(&p, &zero_state, &zero_state);
         // Rounding may prevent convergence to the last bit, so that the number of steps is limited.
         for _ in 0..MAX_NEWTON_STEPS {
-            let residual = O::accelerations(&p.map(N), &equilibrium.map(N), &rest.map(N));
+            let residual = O::accelerations(&p.map(N), &equilibrium.map(N), &zero_state.map(N));
             if residual.iter().all(|a| a.0 == 0.0) {
                 break;
             }
@@ -59,7 +59,7 @@ impl<const C: usize, const P: usize> PreparedPoint<C, P> {
             if previous_equilibrium == equilibrium {
                 break;
             }
-            tangent = compute_tangent::<O, C, D, P>(&p, &equilibrium, &rest);
+            tangent = compute_tangent::<O, C, D, P>(&p, &equilibrium, &zero_state);
         }
         Some(Self { p, window_s, equilibrium, tangent })
     }

@@ -144,7 +144,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
 
     fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
         Simd::check_processor().map_err(Error::model)?;
-        Ok(Engine::new(RowEvaluator { plan }, Simd::best().name()))
+        Ok(Engine::new(RowEvaluator { plan }, Simd::widest().name()))
     }
 }
 
@@ -153,7 +153,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
 struct PointRuns<const C: usize> {
     model_runs: [ModelRun<C>; 2],
     relative_error: Option<f64>,
-    converged: Option<bool>,
+    is_converged: Option<bool>,
     /// The index of the method's name.
     method: usize,
     /// The amplitudes of each model in the plan's channels; empty for a model that failed.
@@ -169,14 +169,14 @@ impl<const C: usize> PointRuns<C> {
         Self {
             model_runs: [failed_run; 2],
             relative_error: None,
-            converged: None,
+            is_converged: None,
             method,
             amplitudes: Default::default(),
             verdict: Verdict::default(),
         }
     }
 
-    fn status(&self) -> usize {
+    fn status_index(&self) -> usize {
         match self.model_runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
             [0, 0] => 0,
             [0, linear] => NO_EQUILIBRIUM_STATUS + linear,
@@ -202,12 +202,12 @@ impl<const C: usize> PointRuns<C> {
         RowComparison {
             amplitudes: self.amplitudes.each_ref().map(Vec::as_slice),
             verdict: &self.verdict,
-            is_converged: self.converged,
+            is_converged: self.is_converged,
             // Chaos is not examined.
             is_sensitive: None,
             method_index: self.method,
             relative_error: self.relative_error,
-            status_index: self.status(),
+            status_index: self.status_index(),
             fail_time_s: self.model_runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
             accepted_steps: self.model_runs.map(|run| run.steps),
             rejected_steps: self.model_runs.map(|run| run.rejected),
@@ -284,13 +284,14 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             }
             PreparedPoint::new::<O, D>(parameters, window_s)
         };
-        let points: Vec<Option<PreparedPoint<C, P>>> =
+        let prepared_or_none: Vec<Option<PreparedPoint<C, P>>> =
             axis_values.iter().map(prepare_point).collect();
         let prepared_indices: Vec<usize> =
-            (0..points.len()).filter(|k| points[*k].is_some()).collect();
-        let prepared_points: Vec<&PreparedPoint<C, P>> = points.iter().flatten().collect();
+            (0..prepared_or_none.len()).filter(|k| prepared_or_none[*k].is_some()).collect();
+        let prepared_points: Vec<&PreparedPoint<C, P>> =
+            prepared_or_none.iter().flatten().collect();
         let (common_method, method_index) = self.common_method();
-        let mut rows = vec![PointRuns::without_equilibrium(method_index); points.len()];
+        let mut rows = vec![PointRuns::without_equilibrium(method_index); prepared_or_none.len()];
         if let Some(method) = common_method {
             for (position, runs) in prepared_indices.into_iter().zip(self.run_both_models(
                 method,
@@ -330,10 +331,10 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             }
             .integrate()
         };
-        let pairs = run_model(OscillatorModel::Nonlinear)
+        let run_pairs = run_model(OscillatorModel::Nonlinear)
             .into_iter()
             .zip(run_model(OscillatorModel::Linear));
-        pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
+        run_pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
     }
 
     /// Integrates both models with steps that are halved until two runs agree.
@@ -350,9 +351,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             } else {
                 None
             };
-            row.converged = Some(row.relative_error.is_some_and(|error| error <= accuracy));
+            row.is_converged = Some(row.relative_error.is_some_and(|error| error <= accuracy));
             row.model_runs = model_runs;
-            if row.converged == Some(true) {
+            if row.is_converged == Some(true) {
                 return;
             }
             step_s *= 0.5;

@@ -63,7 +63,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 {
     /// Integrates every point and returns the results.
     pub(crate) fn integrate(self) -> Vec<ModelRun<C>> {
-        Simd::best().dispatch(self)
+        Simd::widest().dispatch(self)
     }
 }
 

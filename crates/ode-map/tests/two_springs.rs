@@ -71,8 +71,8 @@ fn greatest_difference(integrator: &str) -> f64 {
     let rows = folder.read_rows("x.parquet");
     let reference_text = include_str!("../testdata/two_springs.json");
     let reference: serde_json::Value = serde_json::from_str(reference_text).unwrap();
-    let expected = reference["rows"].as_array().unwrap();
-    assert_eq!(rows.num_rows(), expected.len());
+    let expected_rows = reference["rows"].as_array().unwrap();
+    assert_eq!(rows.num_rows(), expected_rows.len());
     let mut difference = 0.0_f64;
     for (row, expected) in expected.iter().enumerate() {
         for key in ["forcing", "forcing_rad_per_s"] {

@@ -29,10 +29,11 @@ const HASH_DIGITS: usize = 12;
 /// Whether a name is that of a temporary file. The second part of such a name is a hash of the
 /// first, so that no user's file is taken for a temporary one.
 pub fn is_temporary(name: &str) -> bool {
-    let parts =
+    let token_and_check =
         name.strip_prefix(TEMPORARY_PREFIX).and_then(|rest| rest.strip_suffix(TEMPORARY_SUFFIX));
-    let parts = parts.and_then(|parts| parts.split_once('-'));
-    parts.is_some_and(|(token, check)| token.len() == HASH_DIGITS && check == hash_digits(token))
+    let token_and_check = token_and_check.and_then(|joined_parts| joined_parts.split_once('-'));
+    token_and_check
+        .is_some_and(|(token, check)| token.len() == HASH_DIGITS && check == hash_digits(token))
 }
 
 /// Makes a name of a temporary file that this process has not made before.
@@ -201,20 +202,20 @@ mod tests {
     #[test]
     fn create_keeps_an_existing_file_and_write_replaces_it() {
         let folder = tempfile::tempdir().unwrap();
-        let target = folder.path().join("x");
-        assert!(create(folder.path(), &target, b"first").unwrap());
-        assert!(!create(folder.path(), &target, b"second").unwrap());
-        assert_eq!(fs::read(&target).unwrap(), b"first");
-        write(folder.path(), &target, b"third").unwrap();
-        assert_eq!(fs::read(&target).unwrap(), b"third");
+        let target_path = folder.path().join("x");
+        assert!(create(folder.path(), &target_path, b"first").unwrap());
+        assert!(!create(folder.path(), &target_path, b"second").unwrap());
+        assert_eq!(fs::read(&target_path).unwrap(), b"first");
+        write(folder.path(), &target_path, b"third").unwrap();
+        assert_eq!(fs::read(&target_path).unwrap(), b"third");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary stays behind");
     }
 
     #[test]
     fn a_change_of_any_character_makes_another_name_than_a_temporary_file_has() {
-        let names = [temporary_name(), temporary_name()];
-        assert_ne!(names[0], names[1]);
-        for name in names {
+        let temporary_names = [temporary_name(), temporary_name()];
+        assert_ne!(temporary_names[0], temporary_names[1]);
+        for name in temporary_names {
             assert!(is_temporary(&name), "{name}");
             for at in TEMPORARY_PREFIX.len()..name.len() - TEMPORARY_SUFFIX.len() {
                 let mut other_name = name.clone().into_bytes();

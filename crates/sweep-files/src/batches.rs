@@ -326,12 +326,12 @@ fn read_numbers<T: Physical, A: ArrowPrimitiveType>(
     rows: usize,
     convert: impl Fn(T::T) -> A::Native,
 ) -> Result<ArrayRef, ParquetError> {
-    let (levels, values) = read_values(column, rows)?;
-    let values: Vec<A::Native> = values.into_iter().map(convert).collect();
-    Ok(Arc::new(if values.len() == rows {
-        PrimitiveArray::<A>::new(values.into(), None)
+    let (levels, converted_values) = read_values(column, rows)?;
+    let converted_values: Vec<A::Native> = converted_values.into_iter().map(convert).collect();
+    Ok(Arc::new(if converted_values.len() == rows {
+        PrimitiveArray::<A>::new(converted_values.into(), None)
     } else {
-        cells_by_level((levels, values)).collect()
+        cells_by_level((levels, converted_values)).collect()
     }))
 }
 

@@ -137,15 +137,15 @@ mod tests {
 
     #[test]
     fn metadata_that_is_written_is_read_again() {
-        let full = ColumnMetadata {
+        let full_metadata = ColumnMetadata {
             unit: "N s/m".to_owned(),
             description: "damping".to_owned(),
             worse: Some(Worse::Less),
             limit: Some(0.1),
             is_in_summary: true,
         };
-        let plain = ColumnMetadata { unit: "1".to_owned(), ..ColumnMetadata::default() };
-        for metadata in [full, plain] {
+        let plain_metadata = ColumnMetadata { unit: "1".to_owned(), ..ColumnMetadata::default() };
+        for metadata in [full_metadata, plain_metadata] {
             let field = Field::new("x", DataType::Float64, true);
             let field = field.with_metadata(metadata.to_pairs());
             assert_eq!(ColumnMetadata::from_field(&field), metadata);

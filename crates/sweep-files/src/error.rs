@@ -89,8 +89,8 @@ impl FileError {
     pub fn is_refusal(&self) -> bool {
         use io::ErrorKind::{InvalidInput, NotADirectory, NotFound, PermissionDenied};
         let Self::Io { action, source, .. } = self else { return true };
-        let kinds = [InvalidInput, NotADirectory, NotFound, PermissionDenied];
-        *action == "open" && kinds.contains(&source.kind())
+        let user_error_kinds = [InvalidInput, NotADirectory, NotFound, PermissionDenied];
+        *action == "open" && user_error_kinds.contains(&source.kind())
     }
 }
 

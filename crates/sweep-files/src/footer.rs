@@ -130,7 +130,7 @@ fn check_footer(footer: &[u8]) -> Result<(), ParquetError> {
     let mut column_tree = ColumnTree::default();
     let mut name_length = 0;
     let mut child_count = 0;
-    let rest =
+    let remaining_bytes =
         thrift::walk_struct(footer, FILE_META_DATA, &mut |path, found| match (path, found) {
             (NAME_PATH, ThriftItem::Number(length)) => {
                 name_length = u64::try_from(length).unwrap_or(0)
@@ -146,7 +146,7 @@ fn check_footer(footer: &[u8]) -> Result<(), ParquetError> {
             _ => {}
         });
     // The library allocates as many columns as a group declares.
-    if rest.is_none() || column_tree.declared_count >= column_tree.element_count.max(1) {
+    if remaining_bytes.is_none() || column_tree.declared_count >= column_tree.element_count.max(1) {
         return Err(refusal_error("its footer makes no sense"));
     }
     if column_tree.element_count > MAX_COLUMNS {
@@ -375,9 +375,9 @@ mod tests {
         // The library copies the group's name for each of its columns.
         let column_count = 1 << 10;
         let file_with_group_name = |name_length: usize| {
-            let groups = [encode_element(1), encode_group(name_length, column_count)];
+            let elements = [encode_element(1), encode_group(name_length, column_count)];
             encode_file_from(
-                groups.into_iter().chain((0..column_count).map(|_| encode_element(0))).collect(),
+                elements.into_iter().chain((0..column_count).map(|_| encode_element(0))).collect(),
                 &[],
             )
         };
@@ -399,8 +399,9 @@ mod tests {
     #[test]
     fn a_footer_that_is_too_long_is_refused() {
         let mut bytes = encode_file([1, 0], &[]);
-        let length = MAX_FOOTER_BYTES + 1;
-        let footer = [vec![0; length], (length as u32).to_le_bytes().to_vec(), MAGIC.to_vec()];
+        let footer_length = MAX_FOOTER_BYTES + 1;
+        let footer =
+            [vec![0; footer_length], (footer_length as u32).to_le_bytes().to_vec(), MAGIC.to_vec()];
         bytes.extend(footer.concat());
         assert_eq!(error_message(&bytes), "its footer is longer than 16 MiB");
     }

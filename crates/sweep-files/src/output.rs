@@ -183,8 +183,8 @@ mod tests {
         writer.write(&batch).unwrap();
         let mut writer = writer.end().unwrap();
         for key in keys {
-            let value = "{}".to_owned();
-            writer.append_key_value_metadata(KeyValue::new((*key).to_owned(), value));
+            let empty_json = "{}".to_owned();
+            writer.append_key_value_metadata(KeyValue::new((*key).to_owned(), empty_json));
         }
         writer.append_key_value_metadata(seal::blank_digest());
         let mut file = Cursor::new(writer.into_inner().unwrap());

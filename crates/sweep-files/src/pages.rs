@@ -67,10 +67,11 @@ pub(crate) fn open_pages<R: ChunkReader + 'static>(
     rows: usize,
     budget: &ByteBudget,
 ) -> Result<ColumnReader, ParquetError> {
-    let start = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
-    let start = u64::try_from(start).ok();
-    let length = u64::try_from(column.compressed_size()).ok();
-    let column_end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
+    let column_start = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
+    let column_start = u64::try_from(column_start).ok();
+    let column_length = u64::try_from(column.compressed_size()).ok();
+    let column_end =
+        column_start.zip(column_length).and_then(|(start, length)| start.checked_add(length));
     let column_end = column_end.filter(|column_end| *column_end <= file.len());
     let column_end = column_end.ok_or_else(|| refusal_error("a column lies outside of it"))?;
     let page_headers = PageHeaders {
@@ -177,8 +178,10 @@ impl<R: ChunkReader> PageHeaders<R> {
             .map_err(|_| too_long_error())?;
         if matches!(self.codec, Compression::GZIP(_)) && !header.is_uncompressed {
             let level_bytes = to_size(header.level_bytes[0])? + to_size(header.level_bytes[1])?;
-            let length = packed_bytes.checked_sub(level_bytes).ok_or_else(invalid_header_error)?;
-            let compressed_bytes = self.file.get_bytes(start + level_bytes, length as usize)?;
+            let compressed_length =
+                packed_bytes.checked_sub(level_bytes).ok_or_else(invalid_header_error)?;
+            let compressed_bytes =
+                self.file.get_bytes(start + level_bytes, compressed_length as usize)?;
             if unpacks_beyond(&compressed_bytes, unpacked_bytes.saturating_sub(level_bytes)) {
                 return Err(invalid_header_error());
             }
@@ -229,7 +232,7 @@ impl PageHeader {
     /// Parses the header at the beginning of `bytes`, and returns it with the bytes behind it.
     fn parse(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let mut header = Self::default();
-        let rest = thrift::walk_struct(bytes, PAGE_HEADER, &mut |path, value| {
+        let remaining_bytes = thrift::walk_struct(bytes, PAGE_HEADER, &mut |path, value| {
             let ThriftItem::Number(number) = value else { return };
             // The library truncates numbers to this type too.
             let number = number as i32;
@@ -245,7 +248,7 @@ impl PageHeader {
                 _ => {}
             }
         })?;
-        Some((header, rest))
+        Some((header, remaining_bytes))
     }
 }
 
@@ -405,9 +408,9 @@ mod tests {
             bytes.extend(encode_varint(length as u64));
             bytes.extend(vec![7; length]);
             bytes.extend([0, 0, 0]);
-            let expected = if length < 65_000 { "100" } else { "no sense" };
+            let expected_text = if length < 65_000 { "100" } else { "no sense" };
             assert!(
-                budget_bytes_or_error(&bytes, Compression::SNAPPY).contains(expected),
+                budget_bytes_or_error(&bytes, Compression::SNAPPY).contains(expected_text),
                 "{length}"
             );
         }

@@ -54,8 +54,8 @@ fn serialize_without_point<S: serde::Serializer>(
 /// Returns the limits of ratios in a plan.
 pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     let reliability = &plan["reliability"];
-    let upper = reliability["ratio_limit"].as_f64()?;
-    Some(RatioLimits { upper, lower: reliability["ratio_min"].as_f64() })
+    let upper_limit = reliability["ratio_limit"].as_f64()?;
+    Some(RatioLimits { upper: upper_limit, lower: reliability["ratio_min"].as_f64() })
 }
 
 /// An open result file of any kind.
@@ -109,8 +109,8 @@ impl ResultTable {
     pub fn axes(&self) -> Vec<&str> {
         let planned_axes = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
         if let Some(axes) = planned_axes {
-            let names = axes.iter().filter_map(|axis| axis["parameter"].as_str());
-            return names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
+            let axis_names = axes.iter().filter_map(|axis| axis["parameter"].as_str());
+            return axis_names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
         }
         // Files that other programs have rewritten lack the plan.
         let is_amplitude =
@@ -150,11 +150,12 @@ impl ParquetFile {
     /// [`FileError::Io`], [`FileError::NotParquet`].
     pub fn read(
         &self,
-        names: &[&str],
+        column_names: &[&str],
     ) -> Result<impl Iterator<Item = Result<Rows, FileError>> + use<'_>, FileError> {
         let all_columns = columns(self.schema());
         let find_by_name = |name: &&str| all_columns.iter().find(|column| column.name == **name);
-        let requested_columns: Vec<Option<&Column>> = names.iter().map(find_by_name).collect();
+        let requested_columns: Vec<Option<&Column>> =
+            column_names.iter().map(find_by_name).collect();
         // A column that is named twice is decoded once.
         let fields: BTreeMap<usize, CellKind> =
             requested_columns.iter().flatten().map(|column| (column.field, column.kind)).collect();
@@ -188,10 +189,10 @@ impl ParquetFile {
     /// Those of [`ParquetFile::read`], and those of `take`.
     pub fn each_row<E: From<FileError>>(
         &self,
-        names: &[&str],
+        column_names: &[&str],
         mut take: impl FnMut(Row<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        for rows in self.read(names)? {
+        for rows in self.read(column_names)? {
             let rows = rows?;
             (0..rows.count).try_for_each(|row_index| take(rows.row(row_index)))?;
         }

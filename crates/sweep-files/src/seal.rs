@@ -64,10 +64,10 @@ pub(crate) fn check_seal(file: &mut (impl Read + Seek)) -> io::Result<Seal> {
 
 /// Finds the place at which the digest begins.
 fn find_digest_offset(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
-    let length = file.seek(SeekFrom::End(0))?;
-    let start = length.saturating_sub(TAIL_BYTES);
+    let file_length = file.seek(SeekFrom::End(0))?;
+    let tail_start = file_length.saturating_sub(TAIL_BYTES);
     let mut tail = Vec::new();
-    file.seek(SeekFrom::Start(start))?;
+    file.seek(SeekFrom::Start(tail_start))?;
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
     // Thrift's compact protocol writes the key, then 0x18 for a text, its length, and the text.
     let mut key_bytes = key::DIGEST.as_bytes().to_vec();
@@ -76,7 +76,7 @@ fn find_digest_offset(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> 
     let digest_offset = key_offset
         .map(|key_offset| key_offset + key_bytes.len())
         .filter(|digest_offset| digest_offset + DIGEST_DIGITS <= tail.len());
-    Ok(digest_offset.map(|digest_offset| start + digest_offset as u64))
+    Ok(digest_offset.map(|digest_offset| tail_start + digest_offset as u64))
 }
 
 /// Computes the digest of a file whose digest begins at `digest_offset`.

@@ -84,9 +84,9 @@ pub(crate) fn walk_struct<'a>(
     field_types: FieldTypes,
     visit_item: &mut dyn FnMut(&[i16], ThriftItem),
 ) -> Option<&'a [u8]> {
-    let mut walk = StructWalk { rest: bytes, path: Vec::new(), depth: 0, visit_item };
+    let mut walk = StructWalk { remaining_bytes: bytes, path: Vec::new(), depth: 0, visit_item };
     walk.walk_fields(Some(field_types))?;
-    Some(walk.rest)
+    Some(walk.remaining_bytes)
 }
 
 impl ThriftType {
@@ -104,7 +104,7 @@ impl ThriftType {
 }
 
 struct StructWalk<'a, 'f> {
-    rest: &'a [u8],
+    remaining_bytes: &'a [u8],
     path: Vec<i16>,
     depth: usize,
     visit_item: &'f mut dyn FnMut(&[i16], ThriftItem),
@@ -165,13 +165,13 @@ impl StructWalk<'_, '_> {
             }
             TYPE_DOUBLE => self.skip(8)?,
             TYPE_BINARY => {
-                let length = self.read_varint()?;
-                (self.visit_item)(&self.path, ThriftItem::Number(i64::try_from(length).ok()?));
-                self.skip(length)?;
+                let byte_length = self.read_varint()?;
+                (self.visit_item)(&self.path, ThriftItem::Number(i64::try_from(byte_length).ok()?));
+                self.skip(byte_length)?;
             }
             TYPE_LIST => {
                 let header_byte = self.read_byte()?;
-                let length = if header_byte >> 4 == 0xf {
+                let element_count = if header_byte >> 4 == 0xf {
                     self.read_varint()?
                 } else {
                     u64::from(header_byte >> 4)
@@ -181,7 +181,7 @@ impl StructWalk<'_, '_> {
                 } else {
                     None
                 };
-                for _ in 0..length {
+                for _ in 0..element_count {
                     self.walk_value(header_byte & 0xf, element_type)?;
                 }
             }
@@ -201,13 +201,13 @@ impl StructWalk<'_, '_> {
     }
 
     fn read_byte(&mut self) -> Option<u8> {
-        let (first, rest) = self.rest.split_first()?;
-        self.rest = rest;
+        let (first, remaining_bytes) = self.remaining_bytes.split_first()?;
+        self.remaining_bytes = remaining_bytes;
         Some(*first)
     }
 
     fn skip(&mut self, length: u64) -> Option<()> {
-        self.rest = self.rest.get(usize::try_from(length).ok()?..)?;
+        self.remaining_bytes = self.remaining_bytes.get(usize::try_from(length).ok()?..)?;
         Some(())
     }
 
@@ -226,8 +226,8 @@ impl StructWalk<'_, '_> {
 
     /// Reads a signed number, whose lowest bit is the sign.
     fn read_number(&mut self) -> Option<i64> {
-        let number = self.read_varint()?;
-        Some((number >> 1) as i64 ^ -((number & 1) as i64))
+        let unsigned_number = self.read_varint()?;
+        Some((unsigned_number >> 1) as i64 ^ -((unsigned_number & 1) as i64))
     }
 }
 
@@ -270,10 +270,10 @@ mod tests {
     /// Returns the items that a walk reports, and the number of bytes behind the struct.
     fn walk_items(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, ThriftItem)>, usize)> {
         let mut found_fields = Vec::new();
-        let rest = walk_struct(bytes, TEST_FIELD_TYPES, &mut |path, item| {
+        let remaining_bytes = walk_struct(bytes, TEST_FIELD_TYPES, &mut |path, item| {
             found_fields.push((path.to_vec(), item))
         })?;
-        Some((found_fields, rest.len()))
+        Some((found_fields, remaining_bytes.len()))
     }
 
     #[test]
@@ -289,7 +289,7 @@ mod tests {
             &[0x19, 0x28, 0, 1, 7, 0x1c, 0x15, 8, 0, 0, 99],
         ]
         .concat();
-        let expected = vec![
+        let expected_items = vec![
             (vec![1], Number(-3)),
             (vec![2], Number(300)),
             (vec![3, 1], Number(1)),
@@ -305,7 +305,7 @@ mod tests {
             (vec![7], End),
             (vec![], End),
         ];
-        assert_eq!(walk_items(&bytes), Some((expected, 1)));
+        assert_eq!(walk_items(&bytes), Some((expected_items, 1)));
         for length in 0..bytes.len() - 1 {
             assert_eq!(walk_items(&bytes[..length]), None, "{length}");
         }

@@ -108,8 +108,9 @@ fn column_metadata(schema: &Schema) -> KeyValue {
             _ => "string",
         };
         let metadata_pairs = field.metadata().iter().map(|(key, text)| {
-            let number = (key == key::LIMIT).then(|| serde_json::from_str(text).ok()).flatten();
-            (key.clone(), number.unwrap_or_else(|| Value::from(text.as_str())))
+            let limit_number =
+                (key == key::LIMIT).then(|| serde_json::from_str(text).ok()).flatten();
+            (key.clone(), limit_number.unwrap_or_else(|| Value::from(text.as_str())))
         });
         let column_description =
             metadata_pairs.chain([("type".to_owned(), cell_type.into())]).collect::<Value>();

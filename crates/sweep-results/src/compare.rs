@@ -65,9 +65,9 @@ pub struct SharedRow {
 impl SharedRow {
     /// Returns the second ratio over the first.
     pub fn ratio_quotient(&self) -> Option<f64> {
-        let first_row = self.ratios[0]?;
-        let second = self.ratios[1]?;
-        Some(second / first_row).filter(|quotient| quotient.is_finite())
+        let first_ratio = self.ratios[0]?;
+        let second_ratio = self.ratios[1]?;
+        Some(second_ratio / first_ratio).filter(|quotient| quotient.is_finite())
     }
 
     /// Returns the second gap less the first, m.
@@ -229,11 +229,14 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
         let [first, second] = [first, second].map(|table| table.path().display());
         ResultsError::Refused(format!("{first} and {second} cannot be compared: {reason}"))
     };
-    let kinds = [result_kind(first), result_kind(second)];
-    if kinds[0] != kinds[1] {
-        return Err(refusal(format!("the kinds of file are {} and {}", kinds[0], kinds[1])));
+    let result_kinds = [result_kind(first), result_kind(second)];
+    if result_kinds[0] != result_kinds[1] {
+        return Err(refusal(format!(
+            "the kinds of file are {} and {}",
+            result_kinds[0], result_kinds[1]
+        )));
     }
-    let is_boundary = kinds[0] == "boundary";
+    let is_boundary = result_kinds[0] == "boundary";
     let tables = [first, second];
     let keys_by_file = tables.map(|table| side::key_columns(table, is_boundary));
     let keys: Vec<String> =
@@ -252,8 +255,8 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     }
     let unmatched_columns = [0, 1].map(|file| {
         let other_table = tables[1 - file];
-        let names = tables[file].columns.iter().map(|column| column.name.clone());
-        names
+        let column_names = tables[file].columns.iter().map(|column| column.name.clone());
+        column_names
             .filter(|name| other_table.column(name).is_none() && !keys_by_file[file].contains(name))
             .collect::<Vec<_>>()
     });
@@ -339,9 +342,9 @@ fn numbered_key(
     key_counts: &mut HashMap<Vec<u64>, usize>,
 ) -> (Vec<u64>, usize) {
     let key = file.key(row);
-    let count = key_counts.entry(key.clone()).or_default();
-    *count += 1;
-    (key, *count)
+    let occurrence = key_counts.entry(key.clone()).or_default();
+    *occurrence += 1;
+    (key, *occurrence)
 }
 
 /// Returns the columns that differ in the shared rows, and marks the rows that differ.
@@ -369,9 +372,9 @@ fn compare_columns(
             column_change.rows += 1;
             row.differs = true;
             // Other writers store NaN where a value is missing.
-            let number = |cell: Cell| cell.number().filter(|number| !number.is_nan());
+            let to_number = |cell: Cell| cell.number().filter(|number| !number.is_nan());
             let column_row =
-                ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
+                ColumnRow { row: index, values: [to_number(first_cell), to_number(second_cell)] };
             if let [Some(first), Some(second)] = column_row.values {
                 column_change.greatest_difference =
                     column_change.greatest_difference.max((second - first).abs());

@@ -202,8 +202,8 @@ pub(crate) struct AggregateValue {
 impl AggregateValue {
     /// Returns the number of rows for which the condition of a share is true.
     pub(crate) fn share_count(&self) -> Option<u64> {
-        let share = self.value.number().filter(|_| self.is_share)?;
-        Some((share * self.rows as f64).round() as u64)
+        let share_of_rows = self.value.number().filter(|_| self.is_share)?;
+        Some((share_of_rows * self.rows as f64).round() as u64)
     }
 }
 
@@ -257,19 +257,21 @@ impl Accumulator {
         context: &EvaluationContext<'_>,
     ) {
         self.rows += 1;
-        let number = match function {
+        let number_of_row = match function {
             Aggregate::Count | Aggregate::Share => {
                 node.truth(context).map(|truth| f64::from(u8::from(truth)))
             }
             _ => node.number(context),
         };
-        let Some(number) = number else { return };
+        let Some(number_of_row) = number_of_row else { return };
         self.rows_with_value += 1;
-        self.sum += number;
-        self.minimum = Some(self.minimum.map_or(number, |minimum| minimum.min(number)));
-        self.maximum = Some(self.maximum.map_or(number, |maximum| maximum.max(number)));
+        self.sum += number_of_row;
+        self.minimum =
+            Some(self.minimum.map_or(number_of_row, |minimum| minimum.min(number_of_row)));
+        self.maximum =
+            Some(self.maximum.map_or(number_of_row, |maximum| maximum.max(number_of_row)));
         if let Aggregate::Quantile(_) = function {
-            self.numbers.push(number);
+            self.numbers.push(number_of_row);
         }
     }
 

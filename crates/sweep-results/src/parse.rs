@@ -102,35 +102,37 @@ fn error_at<T>(
 /// Splits a text into tokens, the last of which is [`Token::End`].
 fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
     if text.len() > MAX_TEXT_BYTES {
-        let expected = format!("expected at most {MAX_TEXT_BYTES} characters");
-        return error_at("the expression is too long", 0..MAX_TEXT_BYTES.min(1), expected);
+        let expectation = format!("expected at most {MAX_TEXT_BYTES} characters");
+        return error_at("the expression is too long", 0..MAX_TEXT_BYTES.min(1), expectation);
     }
     let mut tokens = Vec::new();
     let mut offset = 0;
     while let Some(first) = text[offset..].chars().next() {
-        let remaining = &text[offset..];
+        let remaining_text = &text[offset..];
         let (token, length) = if first.is_whitespace() {
             offset += first.len_utf8();
             continue;
         } else if first.is_ascii_digit() || first == '.' {
-            let length = number_length(remaining);
-            let number =
-                remaining[..length].parse::<f64>().ok().filter(|number| number.is_finite());
+            let token_length = number_length(remaining_text);
+            let number = remaining_text[..token_length]
+                .parse::<f64>()
+                .ok()
+                .filter(|number| number.is_finite());
             let Some(number) = number else {
-                let title = format!("`{}` is not a number", &remaining[..length]);
+                let title = format!("`{}` is not a number", &remaining_text[..token_length]);
                 return error_at(
                     title,
-                    offset..offset + length,
+                    offset..offset + token_length,
                     "expected a number such as 1.5 or 2e-3",
                 );
             };
-            (Token::Number(number), length)
+            (Token::Number(number), token_length)
         } else if first.is_alphabetic() || first == '_' {
             let is_end_of_word = |letter: char| !(letter.is_alphanumeric() || letter == '_');
-            let length = remaining.find(is_end_of_word).unwrap_or(remaining.len());
-            (Token::Word(remaining[..length].to_owned()), length)
+            let token_length = remaining_text.find(is_end_of_word).unwrap_or(remaining_text.len());
+            (Token::Word(remaining_text[..token_length].to_owned()), token_length)
         } else if first == '"' || first == '\'' {
-            let Some(quote_length) = remaining[1..].find(first) else {
+            let Some(quote_length) = remaining_text[1..].find(first) else {
                 let span = offset..text.len();
                 return error_at(
                     "a text without an end",
@@ -138,11 +140,11 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
                     format!("expected a closing {first}"),
                 );
             };
-            (Token::Text(remaining[1..=quote_length].to_owned()), quote_length + 2)
+            (Token::Text(remaining_text[1..=quote_length].to_owned()), quote_length + 2)
         } else if let Some((foreign_operator, replacement)) =
             FOREIGN_OPERATORS.iter().find(|(foreign_operator, _)| {
-                remaining.starts_with(foreign_operator)
-                    && !(remaining.starts_with("==") || remaining.starts_with("!="))
+                remaining_text.starts_with(foreign_operator)
+                    && !(remaining_text.starts_with("==") || remaining_text.starts_with("!="))
             })
         {
             let title = format!("`{foreign_operator}` is not part of an expression");
@@ -151,12 +153,14 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
                 offset..offset + foreign_operator.len(),
                 format!("expected `{replacement}`"),
             );
-        } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| remaining.starts_with(*symbol)) {
+        } else if let Some(symbol) =
+            SYMBOLS.iter().find(|symbol| remaining_text.starts_with(*symbol))
+        {
             (Token::Symbol(symbol), symbol.len())
         } else {
             let title = format!("`{first}` is not part of an expression");
-            let expected = "expected columns, numbers, `<`, `and`, ...";
-            return error_at(title, offset..offset + first.len_utf8(), expected);
+            let expectation = "expected columns, numbers, `<`, `and`, ...";
+            return error_at(title, offset..offset + first.len_utf8(), expectation);
         };
         tokens.push((token, offset..offset + length));
         offset += length;
@@ -282,9 +286,9 @@ impl Parser<'_> {
             Token::Symbol(symbol) => symbol,
             _ => return None,
         };
-        let accepted = names.iter().find(|(name, _)| *name == next_name).copied()?;
+        let accepted_name = names.iter().find(|(name, _)| *name == next_name).copied()?;
         self.next_index += 1;
-        Some(accepted)
+        Some(accepted_name)
     }
 
     fn parse_disjunction(&mut self) -> ParseResult {
@@ -310,30 +314,34 @@ impl Parser<'_> {
         kind: CellKind,
         operators: &[(&'static str, BinaryNode)],
     ) -> ParseResult {
-        let mut left = operand(self)?;
+        let mut left_node = operand(self)?;
         while let Some((word, node)) = self.accept_any(operators) {
-            let right = operand(self)?;
+            let right_node = operand(self)?;
             let rule = match kind {
                 CellKind::Flag => format!("`{word}` joins what is true or false"),
                 _ => "only numbers are calculated with".to_owned(),
             };
-            for operand_node in [&left, &right] {
+            for operand_node in [&left_node, &right_node] {
                 expect_kind(operand_node, kind, &rule)?;
             }
-            let span = left.span.start..right.span.end;
-            left = TypedNode { node: node(Box::new(left.node), Box::new(right.node)), kind, span };
+            let span = left_node.span.start..right_node.span.end;
+            left_node = TypedNode {
+                node: node(Box::new(left_node.node), Box::new(right_node.node)),
+                kind,
+                span,
+            };
         }
-        Ok(left)
+        Ok(left_node)
     }
 
     fn parse_negation(&mut self) -> ParseResult {
-        let start = self.peek().1.start;
+        let start_offset = self.peek().1.start;
         if !self.accept_word("not") {
             return self.parse_comparison();
         }
         let inner_node = self.parse_nested(Self::parse_negation)?;
         expect_kind(&inner_node, CellKind::Flag, "`not` turns true into false")?;
-        let span = start..inner_node.span.end;
+        let span = start_offset..inner_node.span.end;
         Ok(TypedNode {
             node: ExpressionNode::Not(Box::new(inner_node.node)),
             kind: CellKind::Flag,
@@ -342,35 +350,40 @@ impl Parser<'_> {
     }
 
     fn parse_comparison(&mut self) -> ParseResult {
-        let left = self.parse_sum()?;
+        let left_node = self.parse_sum()?;
         if self.accept_word("is") {
             let is_negated = self.accept_word("not");
             let null_span = self.peek().1.clone();
             if !self.accept_word("null") {
                 return error_at("`is` asks for null", null_span, "expected `null` or `not null`");
             }
-            let span = left.span.start..null_span.end;
-            let node = ExpressionNode::IsNull(Box::new(left.node));
+            let span = left_node.span.start..null_span.end;
+            let node = ExpressionNode::IsNull(Box::new(left_node.node));
             let node = if is_negated { ExpressionNode::Not(Box::new(node)) } else { node };
             return Ok(TypedNode { node, kind: CellKind::Flag, span });
         }
-        let Some((_, comparison)) = self.accept_any(&COMPARISONS) else { return Ok(left) };
-        let right = self.parse_sum()?;
-        if left.kind != right.kind {
-            let title = format!("{} is compared with {}", left.kind.name(), right.kind.name());
-            let expected = match left.kind {
+        let Some((_, comparison)) = self.accept_any(&COMPARISONS) else { return Ok(left_node) };
+        let right_node = self.parse_sum()?;
+        if left_node.kind != right_node.kind {
+            let title =
+                format!("{} is compared with {}", left_node.kind.name(), right_node.kind.name());
+            let expected = match left_node.kind {
                 CellKind::Text => "expected a text, as in \"ok\"".to_owned(),
                 kind => format!("expected {}", kind.name()),
             };
-            return error_at(title, right.span, expected);
+            return error_at(title, right_node.span, expected);
         }
         let second_span = self.peek().1.clone();
         if self.accept_any(&COMPARISONS).is_some() {
             let expected = "expected `and`: write `a < x and x < b`";
             return error_at("a comparison of three values", second_span, expected);
         }
-        let span = left.span.start..right.span.end;
-        let node = ExpressionNode::Compare(comparison, Box::new(left.node), Box::new(right.node));
+        let span = left_node.span.start..right_node.span.end;
+        let node = ExpressionNode::Compare(
+            comparison,
+            Box::new(left_node.node),
+            Box::new(right_node.node),
+        );
         Ok(TypedNode { node, kind: CellKind::Flag, span })
     }
 
@@ -401,8 +414,8 @@ impl Parser<'_> {
             }
             Token::Symbol("(") => {
                 let inner_node = self.parse_nested(Self::parse_disjunction)?;
-                let end = self.accept_closing_parenthesis()?;
-                Ok(TypedNode { span: span.start..end, ..inner_node })
+                let closing_end = self.accept_closing_parenthesis()?;
+                Ok(TypedNode { span: span.start..closing_end, ..inner_node })
             }
             Token::Word(word) if word == "true" || word == "false" => {
                 typed_node(ExpressionNode::Literal(Cell::Flag(word == "true")), CellKind::Flag)
@@ -426,13 +439,14 @@ impl Parser<'_> {
 
     fn parse_column(&mut self, word: &str, span: Range<usize>) -> ParseResult {
         let Some(column) = self.columns.iter().find(|column| column.name == word) else {
-            let names = self.columns.iter().map(|column| column.name.clone());
-            let names = names.chain(FUNCTIONS.map(|(name, _)| name.to_owned())).collect();
+            let valid_names = self.columns.iter().map(|column| column.name.clone());
+            let valid_names =
+                valid_names.chain(FUNCTIONS.map(|(name, _)| name.to_owned())).collect();
             return Err(ExpressionError {
                 title: format!("unknown column `{word}`"),
                 span,
                 expected: "expected a column, or a \"text\" in quotes".to_owned(),
-                candidates: Some((word.to_owned(), names)),
+                candidates: Some((word.to_owned(), valid_names)),
             });
         };
         self.is_by_row |= !self.is_in_aggregate;
@@ -463,7 +477,7 @@ impl Parser<'_> {
         if let Some(Aggregate::Quantile(probability)) = &mut aggregate {
             *probability = self.parse_probability()?;
         }
-        let end = self.accept_closing_parenthesis()?;
+        let closing_end = self.accept_closing_parenthesis()?;
         let expected_kind = match aggregate {
             Some(Aggregate::Count | Aggregate::Share) => CellKind::Flag,
             _ => CellKind::Number,
@@ -529,12 +543,12 @@ impl Parser<'_> {
 }
 
 fn unknown_function_error(word: String, span: Range<usize>) -> ParseResult {
-    let names = FUNCTIONS.map(|(name, _)| name.to_owned());
+    let function_names = FUNCTIONS.map(|(name, _)| name.to_owned());
     Err(ExpressionError {
         title: format!("unknown function `{word}`"),
         span,
-        expected: format!("expected one of {}", names.join(", ")),
-        candidates: Some((word, names.into())),
+        expected: format!("expected one of {}", function_names.join(", ")),
+        candidates: Some((word, function_names.into())),
     })
 }
 

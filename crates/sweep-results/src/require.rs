@@ -88,8 +88,8 @@ pub fn check_condition(
         WorstRows::new(order_column.map(|(_, direction)| direction), max_violating_rows);
     let mut file_truth = None;
     let key_columns = table.key_columns();
-    let names = [&condition.column_names()[..], &key_columns].concat();
-    for_each_row(table, &names, filter, |context| {
+    let read_columns = [&condition.column_names()[..], &key_columns].concat();
+    for_each_row(table, &read_columns, filter, |context| {
         condition_check.rows += 1;
         let context = EvaluationContext { aggregates: &aggregates, ..*context };
         let truth = condition.root.truth(&context);
@@ -105,14 +105,14 @@ pub fn check_condition(
         if allow_null && truth.is_none() {
             return Ok(());
         }
-        let value = order_column.and_then(|(column, _)| context.row.cell(column).number());
-        violating_rows.insert(value, || {
+        let order_value = order_column.and_then(|(column, _)| context.row.cell(column).number());
+        violating_rows.insert(order_value, || {
             let first_key_column = condition.columns.len();
-            let other_columns =
-                (0..first_key_column).filter(|&column| !key_columns.contains(&names[column]));
-            let columns = (first_key_column..names.len()).chain(other_columns);
+            let other_columns = (0..first_key_column)
+                .filter(|&column| !key_columns.contains(&read_columns[column]));
+            let columns = (first_key_column..read_columns.len()).chain(other_columns);
             let cells = columns
-                .map(|column| (names[column].to_owned(), context.row.cell(column)))
+                .map(|column| (read_columns[column].to_owned(), context.row.cell(column)))
                 .collect();
             ViolatingRow { row: context.row.index(), is_undefined: truth.is_none(), cells }
         });

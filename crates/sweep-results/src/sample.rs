@@ -73,10 +73,11 @@ pub(crate) fn map_columns(ratios: &[Option<f64>]) -> Vec<ColumnData> {
     let row_count = ratios.len();
     let masses: Vec<_> = (0..row_count).map(|row| Some(if row < 3 { 0.1 } else { 0.2 })).collect();
     let dampings: Vec<_> = (0..row_count).map(|row| Some(60.0 + 10.0 * (row % 3) as f64)).collect();
-    let reliable: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| ratio < 2.0)).collect();
-    let status: Vec<_> =
+    let reliable_flags: Vec<_> =
+        ratios.iter().map(|ratio| ratio.map(|ratio| ratio < 2.0)).collect();
+    let statuses: Vec<_> =
         ratios.iter().map(|ratio| if ratio.is_some() { "ok" } else { "diverged" }).collect();
-    let sensitive: Vec<_> = (0..row_count).map(|row| Some(row == 4)).collect();
+    let sensitive_flags: Vec<_> = (0..row_count).map(|row| Some(row == 4)).collect();
     let gaps: Vec<_> = ratios.iter().map(|ratio| ratio.map(|ratio| 0.01 - ratio * 1e-3)).collect();
     vec![
         ("point", "1", Arc::new(UInt64Array::from_iter_values(0..row_count as u64))),
@@ -86,10 +87,10 @@ pub(crate) fn map_columns(ratios: &[Option<f64>]) -> Vec<ColumnData> {
         ("linear_body_yaw", "rad", number_array(&vec![Some(1.0); row_count])),
         ("ratio_body_yaw", "1", number_array(ratios)),
         ("ratio_max", "1", number_array(ratios)),
-        ("reliable", "", flag_array(&reliable)),
-        ("sensitive", "", flag_array(&sensitive)),
+        ("reliable", "", flag_array(&reliable_flags)),
+        ("sensitive", "", flag_array(&sensitive_flags)),
         ("min_gap_nonlinear_m", "m", number_array(&gaps)),
-        ("status", "", text_array(&status)),
+        ("status", "", text_array(&statuses)),
     ]
 }
 

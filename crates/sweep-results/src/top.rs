@@ -18,12 +18,12 @@ pub fn top_rows(
     table: &ResultTable,
     columns: &[&str],
     filter: Option<&Condition>,
-    order: Option<(&str, Worse)>,
+    column_and_direction: Option<(&str, Worse)>,
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
     let path = table.path().display();
     let read_columns: Vec<&str> =
-        columns.iter().copied().chain(order.map(|(name, _)| name)).collect();
+        columns.iter().copied().chain(column_and_direction.map(|(name, _)| name)).collect();
     let describe_unknown_column = |name: &&str| {
         let suggested_name =
             nearest_name(name, table.columns.iter().map(|column| column.name.as_str()));
@@ -40,21 +40,22 @@ pub fn top_rows(
     if !unknown_columns.is_empty() {
         return Err(ResultsError::Refused(unknown_columns.join("\n")));
     }
-    if let Some((name, _)) = order
+    if let Some((name, _)) = column_and_direction
         && table.column(name).is_some_and(|column| column.kind == CellKind::Text)
     {
         return Err(ResultsError::Refused(format!(
             "`{name}` of {path} holds no numbers, so it has no order"
         )));
     }
-    let mut worst_rows = WorstRows::new(order.map(|(_, worse)| worse), count);
+    let mut worst_rows = WorstRows::new(column_and_direction.map(|(_, worse)| worse), count);
     for_each_row(table, &read_columns, filter, |context| {
         let row = &context.row;
-        let value = order.and_then(|_| match row.cell(columns.len()) {
+        let order_value = column_and_direction.and_then(|_| match row.cell(columns.len()) {
             Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
             cell => cell.number(),
         });
-        worst_rows.insert(value, || (0..columns.len()).map(|column| row.cell(column)).collect());
+        worst_rows
+            .insert(order_value, || (0..columns.len()).map(|column| row.cell(column)).collect());
         Ok(())
     })?;
     Ok(worst_rows.finish())
@@ -113,8 +114,9 @@ mod tests {
     fn top_ratios(filter: Option<&str>, worse: Worse, count: usize) -> Vec<Cell> {
         let table = sample::table();
         let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
-        let order = Some(("ratio_max", worse));
-        let rows = top_rows(&table, &["ratio_max"], filter.as_ref(), order, count).unwrap();
+        let column_and_direction = Some(("ratio_max", worse));
+        let rows =
+            top_rows(&table, &["ratio_max"], filter.as_ref(), column_and_direction, count).unwrap();
         rows.into_iter().map(|mut row| row.remove(0)).collect()
     }
 

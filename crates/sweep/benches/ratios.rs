@@ -67,7 +67,7 @@ fn trajectories(rounds: usize) {
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
     );
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
-    let points: Vec<Point> = prepare(Simd::best(), &vec![scenario; TRAJECTORIES], &timing)
+    let points: Vec<Point> = prepare(Simd::widest(), &vec![scenario; TRAJECTORIES], &timing)
         .into_iter()
         .map(|point| point.expect("the paper's machine has an equilibrium"))
         .collect();
@@ -126,7 +126,7 @@ fn methods(rounds: usize) -> f64 {
         }
     }
     let points: Vec<Point> =
-        prepare(Simd::best(), &scenarios, &Timing { end_s, window_s, checkpoints: 0 })
+        prepare(Simd::widest(), &scenarios, &Timing { end_s, window_s, checkpoints: 0 })
             .into_iter()
             .map(|point| point.expect("the paper's machine has an equilibrium"))
             .collect();
@@ -154,7 +154,7 @@ fn methods(rounds: usize) -> f64 {
     for _ in 0..rounds {
         for ((_, model, method), times) in subjects.iter().zip(&mut times) {
             let begin = Instant::now();
-            let records = simulate(Simd::best(), *model, method, &points);
+            let records = simulate(Simd::widest(), *model, method, &points);
             times.push(begin.elapsed().as_secs_f64());
             assert!(records.iter().all(|record| record.failure.is_none()));
         }
@@ -162,7 +162,7 @@ fn methods(rounds: usize) -> f64 {
     println!(
         "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs\n\
          that are compared, refined rows) is below:\n",
-        Simd::best().name(),
+        Simd::widest().name(),
         points.len()
     );
     let names: Vec<_> = subjects.iter().map(|subject| subject.0.clone()).collect();
@@ -243,7 +243,7 @@ fn dwells(rounds: usize, pair_s: f64) {
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.4;
-    let point = prepare(Simd::best(), &[(machine, spin)], &timing)
+    let point = prepare(Simd::widest(), &[(machine, spin)], &timing)
         .remove(0)
         .expect("the paper's machine has an equilibrium");
     let dwells: Vec<HeldSpeed<'_>> =
@@ -277,13 +277,14 @@ fn motions(rounds: usize) {
     let prepare_points = |end_s: f64| -> Vec<Point> {
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
         let scenarios = vec![(machine.clone(), spin.clone()); TRAJECTORIES];
-        let points: Result<_, _> = prepare(Simd::best(), &scenarios, &timing).into_iter().collect();
+        let points: Result<_, _> =
+            prepare(Simd::widest(), &scenarios, &timing).into_iter().collect();
         points.expect("the paper's machine has an equilibrium")
     };
     let dwell = prepare_points(1.0);
     let dwells = [HeldSpeed { point: &dwell[0], speed_rpm: SPEED_RPM }];
     let starts = StartRule { count: TRAJECTORIES, max_time_s: 100.0, ..StartRule::default() };
-    let find = || find_attractors(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0);
+    let find = || find_attractors(Simd::widest(), &dwells, &[], &starts, Cancel::Never).remove(0);
     // The time is a whole number of windows.
     let followed_s = find().map(|found| found.attractors[0].time_s).expect("it has motions");
     let as_many = prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
@@ -291,7 +292,7 @@ fn motions(rounds: usize) {
     let integrate = |points: &[Point]| {
         let points: Vec<&Point> = points.iter().collect();
         let method = Method::rk4(STEP_S);
-        let records = simulate(Simd::best(), ModelKind::Nonlinear, &method, &points);
+        let records = simulate(Simd::widest(), ModelKind::Nonlinear, &method, &points);
         assert!(records.iter().all(|record| record.failure.is_none()));
     };
     let mut times = vec![Vec::new(); 4];
@@ -413,7 +414,7 @@ fn elements(rounds: usize) {
                 (machine, spin.clone())
             })
             .collect();
-        prepare(Simd::best(), &scenarios, &timing)
+        prepare(Simd::widest(), &scenarios, &timing)
     });
     let mut times = vec![Vec::new(); subjects.len()];
     for _ in 0..rounds {
@@ -424,7 +425,7 @@ fn elements(rounds: usize) {
                 .collect();
             let begin = Instant::now();
             for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-                let records = simulate(Simd::best(), model, &Method::rk4(2e-4), &points);
+                let records = simulate(Simd::widest(), model, &Method::rk4(2e-4), &points);
                 assert!(records.iter().all(|record| record.failure.is_none()));
             }
             times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);

@@ -64,7 +64,7 @@ pub struct ModelEngine<'a> {
 /// # Errors
 /// Returns an error if this processor has no instruction set of that name.
 pub(crate) fn simd_from_environment() -> Result<Simd, Error> {
-    Ok(forced_simd()?.unwrap_or_else(Simd::best))
+    Ok(forced_simd()?.unwrap_or_else(Simd::widest))
 }
 
 /// Returns the instruction set that the variable `SWEEP_SIMD` names, if it is set.
@@ -224,11 +224,11 @@ impl<'a> ModelEngine<'a> {
 
     /// Returns the instruction set of the widest groups.
     pub(crate) fn widest_simd(&self) -> Simd {
-        self.forced.unwrap_or_else(Simd::best)
+        self.forced.unwrap_or_else(Simd::widest)
     }
 
     fn simd_for(&self, trajectories: usize) -> Simd {
-        self.forced.unwrap_or_else(|| Simd::best().narrowest_for(trajectories))
+        self.forced.unwrap_or_else(|| Simd::widest().narrowest_for(trajectories))
     }
 
     /// Prepares points for integration, those with the same window together. A point that cannot be

@@ -152,7 +152,7 @@ impl<'a> HeldPlan<'a> {
         };
         let simd = simd_from_environment()?;
         let simd_name = match analysis {
-            HeldAnalysis::Responses(_) => Simd::best().name(),
+            HeldAnalysis::Responses(_) => Simd::widest().name(),
             HeldAnalysis::Attractors(_) => simd.name(),
         };
         let evaluator = HeldSpeedEvaluator { held_plan: *self, simd, analysis };

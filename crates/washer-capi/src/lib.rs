@@ -119,7 +119,7 @@ unsafe fn make_equations(setup: &WasherSetup) -> Result<WasherEquations, WasherS
     }
     // Only the equations are used, which do not depend on the times of a run.
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
+    let point = prepare(Simd::widest(), &[(machine, spin)], &timing).pop();
     match point {
         Some(Ok(point)) => Ok(WasherEquations(PointEquations::new(&point, model))),
         _ => Err(WasherStatus::NoEquilibrium),

@@ -56,7 +56,7 @@ pub extern "C" fn output() -> *const f64 {
 /// Returns the number of trajectories that are integrated side by side.
 #[unsafe(no_mangle)]
 pub extern "C" fn lanes() -> usize {
-    Simd::best().lanes()
+    Simd::widest().lanes()
 }
 
 /// Reads the setup from the input. Returns 1 if it is valid, else 0.

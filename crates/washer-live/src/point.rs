@@ -186,8 +186,14 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
 }
 
 fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) -> Vec<LevelRun> {
-    let runs =
-        integrate_points(Simd::best(), ModelKind::ALL[model], method, points, rule, Cancel::Never);
+    let runs = integrate_points(
+        Simd::widest(),
+        ModelKind::ALL[model],
+        method,
+        points,
+        rule,
+        Cancel::Never,
+    );
     runs.unwrap_or_default()
 }
 
@@ -257,7 +263,7 @@ pub fn dwell(
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let no_carried_states = vec![None; held_speeds.len()];
     let attractors = find_attractors(
-        Simd::best(),
+        Simd::widest(),
         &held_speeds,
         &no_carried_states,
         &StartRule::default(),

@@ -32,7 +32,7 @@
 //! }
 //! let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 400.0, ramp_s: 40.0 };
 //! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0], checkpoints: 0 };
-//! let points = prepare(Simd::best(), &[(standard, spin.clone()), (stiff, spin)], &timing);
+//! let points = prepare(Simd::widest(), &[(standard, spin.clone()), (stiff, spin)], &timing);
 //!
 //! let mut results = Vec::new();
 //! for point in points {

@@ -25,13 +25,13 @@ pub(crate) fn read_points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
         )));
     };
     let read_column = |item: Bound<'_, PyAny>| {
-        let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
-        let values = read_numbers(&values).map_err(|error| {
+        let (name, numbers): (String, Bound<'_, PyAny>) = item.extract()?;
+        let numbers = read_numbers(&numbers).map_err(|error| {
             let type_error = PyTypeError::new_err(format!("column `{name}`: expected numbers"));
             type_error.set_cause(py, Some(error));
             type_error
         })?;
-        Ok((name, values))
+        Ok((name, numbers))
     };
     let columns = columns.items()?.iter().map(read_column).collect::<PyResult<Vec<_>>>()?;
     PointTable::from_columns(columns).map_err(|error| plan_error(py, &error))

@@ -29,15 +29,15 @@ pub(crate) fn modes(
     speeds_rpm: Option<&Bound<'_, PyAny>>,
     at: Option<&Bound<'_, PyMapping>>,
 ) -> PyResult<PyResultTable> {
-    let at = to_assignments(at)?;
+    let point_assignments = to_assignments(at)?;
     let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
-    if plan.is_none() && !at.is_empty() {
+    if plan.is_none() && !point_assignments.is_empty() {
         return Err(PyTypeError::new_err("`at` needs a plan"));
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
     let table = supervise_abandonable(py, None, move |execution| {
-        sweep::find_modes(input.as_ref(), &at, &speeds, execution.interrupt)
+        sweep::find_modes(input.as_ref(), &point_assignments, &speeds, execution.interrupt)
     })?;
     Ok(PyResultTable::new(table))
 }
@@ -163,10 +163,10 @@ pub(crate) fn explain<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
     let speeds_rpm = speeds_rpm.map(read_numbers).transpose()?;
-    let at = to_assignments(at)?;
+    let point_assignments = to_assignments(at)?;
     let input = plan.get().input.clone();
     let explanation_result = supervise_abandonable(py, threads, move |execution| {
-        sweep::explain_point(&input, &at, speeds_rpm.as_deref(), execution)
+        sweep::explain_point(&input, &point_assignments, speeds_rpm.as_deref(), execution)
     })?;
     to_explanation(py, explanation_result)
 }
@@ -230,8 +230,8 @@ pub(crate) fn fit<'py>(
 
 /// Creates the package's `Explanation` from data and text.
 fn to_explanation(py: Python<'_>, report: CommandReport) -> PyResult<Bound<'_, PyAny>> {
-    let data = py.import("json")?.call_method1("loads", (report.data.to_string(),))?;
-    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, report.text))
+    let json_data = py.import("json")?.call_method1("loads", (report.data.to_string(),))?;
+    py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((json_data, report.text))
 }
 
 /// Lists all numbers that can be set or swept, with their values in the plan or the built-in

@@ -199,14 +199,14 @@ impl PyPlan {
         angle: bool,
         start: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<PyResultTable> {
-        let at = to_assignments(at)?;
-        let start = to_assignments(start)?;
+        let point_assignments = to_assignments(at)?;
+        let start_assignments = to_assignments(start)?;
         let every_s = (!turns).then_some(every);
         let extras = TraceExtras { rates, states, forces, angle };
-        let options = TraceOptions { every_s, model, all, extras, start };
+        let options = TraceOptions { every_s, model, all, extras, start: start_assignments };
         let input = self.input.clone();
         let (table, failures) = supervise_abandonable(py, None, move |execution| {
-            sweep::trace_point(&input, &at, &options, execution.interrupt)
+            sweep::trace_point(&input, &point_assignments, &options, execution.interrupt)
         })?;
         for failure in failures {
             py.import("warnings")?.call_method1("warn", (failure,))?;
@@ -242,10 +242,10 @@ impl PyPlan {
         let output = out.as_deref();
         let quantity = quantity.to_owned();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice };
-        let search = supervise(py, ComputationOptions { threads, progress }, |execution| {
+        let search_result = supervise(py, ComputationOptions { threads, progress }, |execution| {
             sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, execution)
         })?;
-        finish::table_or_raise(py, search, || {
+        finish::table_or_raise(py, search_result, || {
             let text = match output {
                 Some(out) => format!(
                     "interrupted; the results so far are kept beside {}, and the same call \
@@ -289,7 +289,7 @@ impl PyPlan {
         let plan = self.evaluator.plan();
         let axes: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
         let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
-        let points = format_count(plan.points() as usize, "point");
-        format!("<washer_sweep.Plan {}: {points} over {axes}>", plan.name)
+        let points_text = format_count(plan.points() as usize, "point");
+        format!("<washer_sweep.Plan {}: {points_text} over {axes}>", plan.name)
     }
 }

@@ -28,9 +28,9 @@ impl PyResultTable {
 
     fn field(&self, name: &str) -> PyResult<&Field> {
         self.0.schema().field_with_name(name).map_err(|_| {
-            let names: Vec<&str> =
+            let valid_names: Vec<&str> =
                 self.0.schema().fields().iter().map(|field| field.name().as_str()).collect();
-            PyKeyError::new_err(format!("no column `{name}`; there are {}", names.join(", ")))
+            PyKeyError::new_err(format!("no column `{name}`; there are {}", valid_names.join(", ")))
         })
     }
 
@@ -209,10 +209,10 @@ impl PyResultTable {
 
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
-        let kind = self.0.kind().short_name();
+        let kind_name = self.0.kind().short_name();
         let rows = format_count(self.0.rows(), "row");
         let columns = format_count(self.0.schema().fields().len(), "column");
-        format!("<washer_sweep.Result: {kind} of {name}, {rows}, {columns}>")
+        format!("<washer_sweep.Result: {kind_name} of {name}, {rows}, {columns}>")
     }
 }
 

@@ -23,9 +23,8 @@ fn an_integration_allocates_nothing() {
         for method in [TestMethod::Rk4, TestMethod::Dop853].into_iter().chain(adaptive_methods) {
             let (outcomes, allocations) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             assert!(
-                outcomes
-                    .iter()
-                    .all(|o| matches!(o.end, SegmentEnd::Completed(_)) && o.count.accepted > 5)
+                outcomes.iter().all(|o| matches!(o.segment_end, SegmentEnd::Completed(_))
+                    && o.step_count.accepted > 5)
             );
             assert_eq!(allocations, 0, "{method:?} on {simd:?}");
         }

@@ -52,10 +52,10 @@ const CASES: &[DerivativeCase] = &[
     }),
     case!("sin(x x) / sqrt(x + 2)", |x| (x * x).v().sin_cos().0 / (x + 2.0).sqrt(), |x| {
         let ((s, c), r) = ((x * x).sin_cos(), (x + 2.0).sqrt());
-        let first = 2.0 * x * c / r - 0.5 * s / (r * r * r);
-        let second =
+        let first_derivative = 2.0 * x * c / r - 0.5 * s / (r * r * r);
+        let second_derivative =
             (2.0 * c - 4.0 * x * x * s) / r - 2.0 * x * c / (r * r * r) + 0.75 * s / r.powi(5);
-        [first, second]
+        [first_derivative, second_derivative]
     }),
 ];
 
@@ -83,9 +83,9 @@ fn first_and_second_derivatives_agree_with_closed_forms() {
                 case.name,
                 y.slope
             );
-            let inner = Dual { value: x, slope: 1.0 };
+            let inner_dual = Dual { value: x, slope: 1.0 };
             let y = (case.nested_dual)(N(Dual {
-                value: inner,
+                value: inner_dual,
                 slope: Dual { value: 1.0, slope: 0.0 },
             }))
             .0;

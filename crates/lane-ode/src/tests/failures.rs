@@ -62,7 +62,7 @@ fn solve_among_regular(
     for simd in instruction_sets() {
         let unmixed_outcomes: Vec<_> = (0..12).map(regular_trajectory).collect();
         let (unmixed_outcomes, _) = solve::<FailingEquation, 3, 5>(simd, method, &unmixed_outcomes);
-        assert!(unmixed_outcomes.iter().all(|o| matches!(o.end, SegmentEnd::Completed(_))));
+        assert!(unmixed_outcomes.iter().all(|o| matches!(o.segment_end, SegmentEnd::Completed(_))));
         for offset in 0..4 {
             // Every third trajectory from `offset` on fails.
             let mut mixed_trajectories: Vec<_> = (0..12).map(regular_trajectory).collect();
@@ -94,8 +94,8 @@ fn solve_among_regular(
                 first_failed_outcomes.get_or_insert_with(|| failed_outcomes.clone());
             for (outcome, first_failure) in failed_outcomes.iter().zip(first_failure.iter()) {
                 assert_eq!(
-                    (outcome.end, outcome.count),
-                    (first_failure.end, first_failure.count),
+                    (outcome.segment_end, outcome.step_count),
+                    (first_failure.segment_end, first_failure.step_count),
                     "{simd:?}"
                 );
             }
@@ -105,7 +105,7 @@ fn solve_among_regular(
 }
 
 fn failure_reason_and_time(outcome: &TestOutcome<3>) -> (Failure, f64) {
-    let SegmentEnd::Failed { reason, time_s, .. } = outcome.end else {
+    let SegmentEnd::Failed { reason, time_s, .. } = outcome.segment_end else {
         panic!("it did not fail: {outcome:?}")
     };
     (reason, time_s)
@@ -161,7 +161,7 @@ fn a_trajectory_at_its_limit_of_steps_ends_alone() {
     {
         let (reason, _) = failure_reason_and_time(&outcome);
         assert_eq!(reason, Failure::StepLimit);
-        let SegmentEnd::Failed { count, .. } = outcome.end else { unreachable!() };
+        let SegmentEnd::Failed { count, .. } = outcome.segment_end else { unreachable!() };
         assert_eq!(count.accepted + count.rejected, 2000);
     }
 }

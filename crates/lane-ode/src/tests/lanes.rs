@@ -156,13 +156,13 @@ fn is_same(a: f64, b: f64) -> bool {
 fn check_results(name: &str, operands: &[Operands], results: &[[f64; RESULT_COUNT]]) {
     assert_eq!(operands.len(), results.len());
     for (operands, results) in operands.iter().zip(results) {
-        let expected = expected_results(*operands);
+        let expected_row = expected_results(*operands);
         for i in 0..RESULT_COUNT {
             assert!(
-                is_same(results[i], expected[i]),
+                is_same(results[i], expected_row[i]),
                 "{name}, result {i} of {operands:?}: {} against {}",
                 results[i],
-                expected[i]
+                expected_row[i]
             );
         }
     }

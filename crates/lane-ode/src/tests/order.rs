@@ -29,11 +29,11 @@ fn end_and_inside_errors(method: TestMethod, steps: &[u32]) -> Vec<[f64; 2]> {
             }
         })
         .collect();
-    let (outcomes, _) = solve::<SwingEquation, 3, 1>(Simd::best(), method, &trajectories);
+    let (outcomes, _) = solve::<SwingEquation, 3, 1>(Simd::widest(), method, &trajectories);
     let exact_state = SwingEquation::exact_state(&[1.0], END_S);
     let errors_of_outcome = |(n, outcome): (&u32, TestOutcome<3>)| {
-        assert!(matches!(outcome.end, SegmentEnd::Completed(_)), "{outcome:?}");
-        assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
+        assert!(matches!(outcome.segment_end, SegmentEnd::Completed(_)), "{outcome:?}");
+        assert_eq!((outcome.step_count.accepted, outcome.step_count.rejected), (u64::from(*n), 0));
         let end_error = (0..3).map(|i| (outcome.x[i] - exact_state[i]).abs()).fold(0.0, f64::max);
         [end_error, outcome.error_inside]
     };
@@ -119,17 +119,17 @@ fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
     for relative in [1e-4, 1e-6] {
         let run_tolerance = tolerance(relative, 5_000);
         let (outcomes, _) = solve::<CoupledEquation, 4, 1>(
-            Simd::best(),
+            Simd::widest(),
             TestMethod::Additive(run_tolerance),
             core::slice::from_ref(&trajectory),
         );
-        let TestOutcome { end, x, count, .. } = outcomes[0];
-        assert!(matches!(end, SegmentEnd::Completed(_)), "{end:?}");
+        let TestOutcome { segment_end, x, step_count, .. } = outcomes[0];
+        assert!(matches!(segment_end, SegmentEnd::Completed(_)), "{segment_end:?}");
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
-        eprintln!("additive at {relative:e}: error {error:.1e}, {count:?}");
+        eprintln!("additive at {relative:e}: error {error:.1e}, {step_count:?}");
         assert!(error < 10.0 * relative, "{relative:e} gave {error:e}");
         // An explicit formula would need about 5e4 steps.
-        assert!(count.accepted + count.rejected < 1_000, "{count:?}");
+        assert!(step_count.accepted + step_count.rejected < 1_000, "{step_count:?}");
     }
 }
 
@@ -142,16 +142,16 @@ fn step_count_ratios(method: fn(Tolerance) -> TestMethod) -> Vec<f64> {
     for relative in [1e-5, 1e-7, 1e-9, 1e-11] {
         let tolerance = tolerance(relative, 100_000);
         let (outcomes, _) = solve::<SwingEquation, 3, 1>(
-            Simd::best(),
+            Simd::widest(),
             method(tolerance),
             core::slice::from_ref(&trajectory),
         );
-        let TestOutcome { end, x, count, .. } = outcomes[0];
-        assert!(matches!(end, SegmentEnd::Completed(_)));
+        let TestOutcome { segment_end, x, step_count, .. } = outcomes[0];
+        assert!(matches!(segment_end, SegmentEnd::Completed(_)));
         let error = (0..3).map(|i| (x[i] - exact_state[i]).abs()).fold(0.0, f64::max);
-        eprintln!("{:?}: error {error:.2e}, {count:?}", method(tolerance));
+        eprintln!("{:?}: error {error:.2e}, {step_count:?}", method(tolerance));
         assert!(error < 30.0 * relative, "{relative:e} gave {error:e}");
-        step_counts.push(count.accepted as f64);
+        step_counts.push(step_count.accepted as f64);
     }
     step_counts.windows(2).map(|pair| pair[1] / pair[0]).collect()
 }
@@ -174,12 +174,12 @@ fn no_step_is_longer_than_the_longest() {
         let tolerance = Tolerance { longest_step_s: Some(longest_step_s), ..ACCEPT_ALL };
         for method in [TestMethod::Dop853Adaptive(tolerance), TestMethod::Additive(tolerance)] {
             let (outcomes, _) = solve::<SwingEquation, 3, 1>(
-                Simd::best(),
+                Simd::widest(),
                 method,
                 core::slice::from_ref(&trajectory),
             );
             // Steps grow from the first one at most by a factor of 5, and the last one is shorter.
-            let accepted_steps = outcomes[0].count.accepted as f64;
+            let accepted_steps = outcomes[0].step_count.accepted as f64;
             let min_steps = 20.0 / longest_step_s;
             assert!(
                 (min_steps..min_steps + 4.0).contains(&accepted_steps),
@@ -215,7 +215,7 @@ fn every_segment_ends_exactly_at_its_end() {
         for simd in super::instruction_sets() {
             let (outcomes, _) = solve::<SwingEquation, 3, 1>(simd, method, &trajectories);
             for (end_s, outcome) in end_times.into_iter().zip(outcomes) {
-                assert!(matches!(outcome.end, SegmentEnd::Completed(_)));
+                assert!(matches!(outcome.segment_end, SegmentEnd::Completed(_)));
                 assert_eq!(
                     outcome.observed_to_s.to_bits(),
                     end_s.to_bits(),

@@ -25,11 +25,11 @@ impl Waves {
         y
     }
 
-    /// Computes the largest magnitude from 0 to `end`: the largest on a fine grid, refined by
+    /// Computes the largest magnitude from 0 to `end_s`: the largest on a fine grid, refined by
     /// Newton's method.
-    fn exact_peak(&self, end: f64) -> f64 {
+    fn exact_peak(&self, end_s: f64) -> f64 {
         let cell_count = 4000;
-        let step = end / f64::from(cell_count);
+        let step = end_s / f64::from(cell_count);
         let magnitude = |i: i32| self.derivatives(step * f64::from(i))[0].abs();
         let largest_index =
             (0..=cell_count).max_by(|&i, &j| magnitude(i).total_cmp(&magnitude(j))).unwrap();
@@ -39,7 +39,7 @@ impl Waves {
             t -= slope / curvature;
         }
         let is_inside =
-            (0.0..=end).contains(&t) && (t - step * f64::from(largest_index)).abs() <= step;
+            (0.0..=end_s).contains(&t) && (t - step * f64::from(largest_index)).abs() <= step;
         if is_inside {
             self.derivatives(t)[0].abs().max(magnitude(largest_index))
         } else {
@@ -53,13 +53,13 @@ impl Waves {
     }
 
     /// Returns the peak that [`Peaks`] determines in `steps` equal steps.
-    fn sampled_peak(&self, end: f64, steps: u32) -> f64 {
-        self.sampled_peak_by(Peaks::advance, end, steps)
+    fn sampled_peak(&self, end_s: f64, steps: u32) -> f64 {
+        self.sampled_peak_by(Peaks::advance, end_s, steps)
     }
 
     /// Returns the peak that [`Peaks`] determines in `steps` equal steps by the method `advance`.
-    fn sampled_peak_by(&self, advance: Advance, end: f64, steps: u32) -> f64 {
-        let h = end / f64::from(steps);
+    fn sampled_peak_by(&self, advance: Advance, end_s: f64, steps: u32) -> f64 {
+        let h = end_s / f64::from(steps);
         let mut peaks = Peaks::<f64, 1>::new(N(0.0));
         peaks.begin(&[self.sample(0.0)], true);
         for i in 1..=steps {
@@ -110,20 +110,20 @@ fn the_sampling_error_stays_below_1e_5_down_to_ten_steps_a_period() {
 #[test]
 fn the_sampling_error_is_of_sixth_order() {
     let [coarse_error, fine_error] = [12, 24].map(largest_error);
-    let order = (coarse_error / fine_error).log2();
-    eprintln!("order of a peak's sampling error: {order:.2}");
-    assert!(order > 5.5, "{order}");
+    let observed_order = (coarse_error / fine_error).log2();
+    eprintln!("order of a peak's sampling error: {observed_order:.2}");
+    assert!(observed_order > 5.5, "{observed_order}");
 }
 
 #[test]
 fn without_curvatures_the_sampling_error_is_of_fourth_order() {
     let [coarse_error, fine_error] =
         [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
-    let order = (coarse_error / fine_error).log2();
+    let observed_order = (coarse_error / fine_error).log2();
     eprintln!(
-        "without curvatures, 48 steps a period: {fine_error:.2e} of the amplitude, order {order:.2}"
+        "without curvatures, 48 steps a period: {fine_error:.2e} of the amplitude, order {observed_order:.2}"
     );
-    assert!(order > 3.5 && fine_error < 1e-5, "{order} {fine_error:e}");
+    assert!(observed_order > 3.5 && fine_error < 1e-5, "{observed_order} {fine_error:e}");
 }
 
 #[test]

@@ -14,9 +14,10 @@ fn random_waves(seed: u64) -> Waves {
     }
 }
 
-/// Returns the peaks of the parts between division times, from `steps` equal steps over 0 to `end`.
-fn part_peaks(waves: &Waves, division_times_s: &[f64], end: f64, steps: u32) -> Vec<f64> {
-    let h = end / f64::from(steps);
+/// Returns the peaks of the parts between division times, from `steps` equal steps over 0 to
+/// `end_s`.
+fn part_peaks(waves: &Waves, division_times_s: &[f64], end_s: f64, steps: u32) -> Vec<f64> {
+    let h = end_s / f64::from(steps);
     let mut peaks = IntervalPeaks::<f64, 1>::new(N(0.0));
     peaks.reset(0, division_times_s);
     peaks.begin(&[waves.sample(0.0)], true);
@@ -28,13 +29,13 @@ fn part_peaks(waves: &Waves, division_times_s: &[f64], end: f64, steps: u32) -> 
 }
 
 /// Returns the peak between two times, from steps that end at both.
-fn peak_between(waves: &Waves, start: f64, end: f64) -> f64 {
+fn peak_between(waves: &Waves, start_s: f64, end_s: f64) -> f64 {
     const STEPS: u32 = 4000;
-    let h = (end - start) / f64::from(STEPS);
+    let h = (end_s - start_s) / f64::from(STEPS);
     let mut peaks = Peaks::<f64, 1>::new(N(0.0));
-    peaks.begin(&[waves.sample(start)], true);
+    peaks.begin(&[waves.sample(start_s)], true);
     for i in 1..=STEPS {
-        peaks.advance(N(h), &[waves.sample(start + h * f64::from(i))], true);
+        peaks.advance(N(h), &[waves.sample(start_s + h * f64::from(i))], true);
     }
     peaks.lane_peaks(0)[0]
 }
@@ -50,8 +51,11 @@ fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
         let peaks = part_peaks(&waves, &division_times_s, 5.0, 100);
         assert_eq!(peaks.len(), division_times_s.len() + 1);
         for (peak, part_bounds_s) in peaks.iter().zip(boundaries_s.windows(2)) {
-            let expected = peak_between(&waves, part_bounds_s[0], part_bounds_s[1]);
-            assert!((peak - expected).abs() < 1e-6, "{part_bounds_s:?}: {peak} for {expected}");
+            let expected_peak = peak_between(&waves, part_bounds_s[0], part_bounds_s[1]);
+            assert!(
+                (peak - expected_peak).abs() < 1e-6,
+                "{part_bounds_s:?}: {peak} for {expected_peak}"
+            );
         }
     }
     assert_eq!(part_peaks(&random_waves(1), &[], 5.0, 100).len(), 1);
@@ -97,9 +101,9 @@ fn the_parts_of_a_lane_do_not_depend_on_division_times_of_other_lanes() {
 fn square_error(steps: u32) -> f64 {
     let amplitude = 1.5;
     let phase = 0.4;
-    let end = 2.3;
+    let end_s = 2.3;
     let waves = Waves { amplitude: [amplitude, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
-    let h = end / f64::from(steps);
+    let h = end_s / f64::from(steps);
     let mut square_integrals = SquareIntegrals::<f64, 1>::new(N(0.0));
     square_integrals.begin(&[waves.sample(0.0)]);
     for i in 1..=steps {
@@ -107,18 +111,20 @@ fn square_error(steps: u32) -> f64 {
         square_integrals.advance(N(h), &[waves.sample(h * f64::from(i))], true);
         square_integrals.advance(N(0.0), &[waves.sample(h * f64::from(i))], true);
     }
-    square_integrals.advance(N(1.0), &[waves.sample(end + 1.0)], false);
+    square_integrals.advance(N(1.0), &[waves.sample(end_s + 1.0)], false);
     let antiderivative = |t: f64| t / 2.0 - (2.0 * (TAU * t + phase)).sin() / (4.0 * TAU);
-    let exact_integral = amplitude * amplitude * (antiderivative(end) - antiderivative(0.0));
+    let exact_integral = amplitude * amplitude * (antiderivative(end_s) - antiderivative(0.0));
     (square_integrals.lane_integrals(0)[0] - exact_integral).abs() / exact_integral
 }
 
 #[test]
 fn integrals_of_squares_are_of_sixth_order() {
     let [coarse_error, fine_error] = [30, 60].map(square_error);
-    let order = (coarse_error / fine_error).log2();
-    eprintln!("integral of a square: {fine_error:.1e} at 26 steps a period, order {order:.2}");
-    assert!(order > 5.5 && fine_error < 1e-6, "{order} {fine_error:e}");
+    let observed_order = (coarse_error / fine_error).log2();
+    eprintln!(
+        "integral of a square: {fine_error:.1e} at 26 steps a period, order {observed_order:.2}"
+    );
+    assert!(observed_order > 5.5 && fine_error < 1e-6, "{observed_order} {fine_error:e}");
 }
 
 /// Returns the time above zero of a sine wave minus `height` over whole periods: computed from

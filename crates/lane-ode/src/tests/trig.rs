@@ -140,8 +140,11 @@ fn whole_turns_are_removed_without_rounding() {
     for fraction in [0.0, 0.125, 0.2, -0.3, 0.499] {
         let [near, far] = [1.0, 1048576.0].map(|turns| {
             // The fraction, rounded such that the sum with `turns` is exact.
-            let rounded: f64 = (fraction + turns) - turns;
-            (trig::sin_cos_turns(N(rounded)), trig::sin_cos_turns(N(rounded + turns)))
+            let rounded_fraction: f64 = (fraction + turns) - turns;
+            (
+                trig::sin_cos_turns(N(rounded_fraction)),
+                trig::sin_cos_turns(N(rounded_fraction + turns)),
+            )
         });
         for ((sin, cos), (sin_later, cos_later)) in [near, far] {
             assert_eq!(sin.0.to_bits(), sin_later.0.to_bits(), "{fraction}");

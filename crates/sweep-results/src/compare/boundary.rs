@@ -77,10 +77,10 @@ impl BoundaryShift {
             return None;
         }
         let count = self.crossings.len() as f64;
-        let sum = |end: usize| {
+        let sum_at_end = |end: usize| {
             self.crossings.iter().map(|crossing| crossing.shift_range()[end]).sum::<f64>()
         };
-        Some([sum(0) / count, sum(1) / count])
+        Some([sum_at_end(0) / count, sum_at_end(1) / count])
     }
 
     /// Counts the crossings that shifted farther than their brackets explain.
@@ -108,21 +108,23 @@ type CrossingsByLine = BTreeMap<Vec<u64>, LineCrossings>;
 
 /// Pairs the crossings of the two files line by line.
 fn pair_crossings(
-    first: &ResultTable,
-    axis: &str,
+    first_table: &ResultTable,
+    axis_name: &str,
     keys: Vec<String>,
     crossings_by_line: CrossingsByLine,
 ) -> BoundaryShift {
     let mut crossings = Vec::new();
     let mut unmatched_lines = Vec::new();
-    for LineCrossings { key_values, crossings_by_file: [first, second] } in
+    for LineCrossings { key_values, crossings_by_file: [first_crossings, second_crossings] } in
         crossings_by_line.into_values()
     {
-        if first.len() != second.len() {
-            unmatched_lines.push((key_values, [first.len(), second.len()]));
+        if first_crossings.len() != second_crossings.len() {
+            unmatched_lines.push((key_values, [first_crossings.len(), second_crossings.len()]));
             continue;
         }
-        for (index, (first, second)) in first.into_iter().zip(second).enumerate() {
+        for (index, (first, second)) in
+            first_crossings.into_iter().zip(second_crossings).enumerate()
+        {
             crossings.push(BoundaryCrossing {
                 key_values: key_values.clone(),
                 number: index + 1,
@@ -131,8 +133,9 @@ fn pair_crossings(
             });
         }
     }
-    let unit = first.column(axis).map(|column| column.unit().to_owned()).unwrap_or_default();
-    BoundaryShift { axis: axis.to_owned(), unit, keys, crossings, unmatched_lines }
+    let unit =
+        first_table.column(axis_name).map(|column| column.unit().to_owned()).unwrap_or_default();
+    BoundaryShift { axis: axis_name.to_owned(), unit, keys, crossings, unmatched_lines }
 }
 
 /// Returns integers that sort in the same order as the numbers.
@@ -147,11 +150,11 @@ fn sort_key(values: &[f64]) -> Vec<u64> {
 
 /// Compares two boundary files.
 pub(super) fn compare_boundaries(
-    first: &ResultTable,
-    second: &ResultTable,
+    first_table: &ResultTable,
+    second_table: &ResultTable,
 ) -> Result<Option<BoundaryShift>, ResultsError> {
-    let axis_names = first.axes();
-    let axis_names_in_second = second.axes();
+    let axis_names = first_table.axes();
+    let axis_names_in_second = second_table.axes();
     let [_, axis, ..] = axis_names[..] else { return Ok(None) };
     let keys: Vec<&str> = axis_names
         .iter()
@@ -159,7 +162,7 @@ pub(super) fn compare_boundaries(
         .filter(|name| *name != axis && axis_names_in_second.contains(name))
         .collect();
     let mut crossings_by_line = CrossingsByLine::new();
-    for (file, table) in [first, second].into_iter().enumerate() {
+    for (file, table) in [first_table, second_table].into_iter().enumerate() {
         let bracket_columns = ["_low", "_high"].map(|suffix| {
             let column = table.columns.iter().find(|column| {
                 column.name.contains(suffix) && column.name.replacen(suffix, "", 1) == axis
@@ -172,7 +175,7 @@ pub(super) fn compare_boundaries(
             let read_number = |column: usize| row.cell(column).number();
             let key_values: Option<Vec<f64>> = (0..keys.len()).map(read_number).collect();
             let Some(key_values) = key_values else { return Ok(()) };
-            let line = crossings_by_line
+            let line_crossings = crossings_by_line
                 .entry(sort_key(&key_values))
                 .or_insert_with(|| LineCrossings { key_values, ..LineCrossings::default() });
             let axis_column = keys.len();
@@ -180,26 +183,26 @@ pub(super) fn compare_boundaries(
                 (read_number(axis_column + 1), read_number(axis_column + 2))
             {
                 let position = read_number(axis_column).unwrap_or(f64::midpoint(low, high));
-                line.crossings_by_file[file]
+                line_crossings.crossings_by_file[file]
                     .push(BracketedCrossing { position, bracket: [low, high] });
             }
             Ok::<(), ResultsError>(())
         })?;
     }
     let keys = keys.into_iter().map(str::to_owned).collect();
-    Ok(Some(pair_crossings(first, axis, keys, crossings_by_line)))
+    Ok(Some(pair_crossings(first_table, axis, keys, crossings_by_line)))
 }
 
 /// Compares the boundaries of two maps: a crossing lies between neighbours along the second axis
 /// whose verdicts differ.
 pub(super) fn compare_maps(
-    first: &ResultTable,
+    first_table: &ResultTable,
     keys: &[String],
     shared_rows: &[SharedRow],
 ) -> Option<BoundaryShift> {
-    let limit = first.plan.as_ref()?["reliability"]["ratio_limit"].as_f64()?;
+    let limit = first_table.plan.as_ref()?["reliability"]["ratio_limit"].as_f64()?;
     // The points of a design have no neighbours along an axis.
-    if keys.len() < 2 || first.plan.as_ref()?.get("design").is_some() {
+    if keys.len() < 2 || first_table.plan.as_ref()?.get("design").is_some() {
         return None;
     }
     let mut other_keys = keys.to_vec();
@@ -208,9 +211,9 @@ pub(super) fn compare_maps(
     for row in shared_rows {
         let mut key_values = row.key.clone();
         key_values.remove(1);
-        let line =
+        let key_values_and_rows =
             rows_by_line.entry(sort_key(&key_values)).or_insert_with(|| (key_values, Vec::new()));
-        line.1.push(row);
+        key_values_and_rows.1.push(row);
     }
     let mut crossings_by_line = CrossingsByLine::new();
     for (key, (key_values, mut rows)) in rows_by_line {
@@ -228,17 +231,17 @@ pub(super) fn compare_maps(
 /// Finds the crossing between two neighbours in one file, by a straight line through the logarithms
 /// of their ratios.
 fn find_crossing(
-    below: &SharedRow,
-    above: &SharedRow,
+    lower_row: &SharedRow,
+    upper_row: &SharedRow,
     file: usize,
     limit: f64,
 ) -> Option<BracketedCrossing> {
-    let ratio_below = below.ratios[file]?;
-    let ratio_above = above.ratios[file]?;
+    let ratio_below = lower_row.ratios[file]?;
+    let ratio_above = upper_row.ratios[file]?;
     if (ratio_below < limit) == (ratio_above < limit) {
         return None;
     }
-    let bracket = [below, above].map(|row| [&row.key, &row.second_key][file][1]);
+    let bracket = [lower_row, upper_row].map(|row| [&row.key, &row.second_key][file][1]);
     let fraction = (limit / ratio_below).ln() / (ratio_above / ratio_below).ln();
     Some(BracketedCrossing { position: bracket[0] + fraction * (bracket[1] - bracket[0]), bracket })
 }

@@ -44,13 +44,13 @@ pub(super) fn compare_plans(first: &ParquetFile, second: &ParquetFile) -> Vec<Pl
 
 /// Returns every value that differs between two plans. Lists of different lengths, and lists of
 /// numbers, are one value each.
-pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
-    let is_nested_list = |first: &[Value], second: &[Value]| {
-        first.len() == second.len() && first.iter().any(Value::is_object)
+pub fn plan_changes(first_plan: &Value, second_plan: &Value) -> Vec<PlanChange> {
+    let is_nested_list = |first_list: &[Value], second_list: &[Value]| {
+        first_list.len() == second_list.len() && first_list.iter().any(Value::is_object)
     };
     let mut changes = Vec::new();
     visit_leaves(
-        [Some(first), Some(second)],
+        [Some(first_plan), Some(second_plan)],
         is_nested_list,
         &mut Vec::new(),
         &mut |path, values| {
@@ -65,9 +65,12 @@ pub fn plan_changes(first: &Value, second: &Value) -> Vec<PlanChange> {
 
 /// Returns whether the points of two plans differ only by the nominal values of axes with
 /// tolerances.
-pub(super) fn differs_in_nominal_values(first: Option<&Value>, second: Option<&Value>) -> bool {
-    let Some((first, second)) = first.zip(second) else { return false };
-    first["axis"] != second["axis"]
+pub(super) fn differs_in_nominal_values(
+    first_plan: Option<&Value>,
+    second_plan: Option<&Value>,
+) -> bool {
+    let Some((first_plan, second_plan)) = first_plan.zip(second_plan) else { return false };
+    first_plan["axis"] != second_plan["axis"]
         && first["design"] == second["design"]
         && without_toleranced_numbers(&first["axis"]) == without_toleranced_numbers(&second["axis"])
 }

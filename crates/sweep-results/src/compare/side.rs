@@ -95,7 +95,7 @@ impl ComparedFile {
             )));
         }
         let row_groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
-        let rows = row_groups.iter().map(|group| group.count).sum();
+        let row_count = row_groups.iter().map(|group| group.count).sum();
         Ok(Self {
             row_groups,
             rows,
@@ -119,18 +119,18 @@ impl ComparedFile {
     /// Returns the cell of a row in the column at a position.
     pub(super) fn cell(&self, position: usize, row: usize) -> Cell {
         let group_index =
-            self.row_groups.partition_point(|group| group.first_row <= row as u64) - 1;
-        let group = &self.row_groups[group_index];
-        group.row(row - group.first_row as usize).cell(position)
+            self.row_groups.partition_point(|row_group| row_group.first_row <= row as u64) - 1;
+        let row_group = &self.row_groups[group_index];
+        row_group.row(row - row_group.first_row as usize).cell(position)
     }
 
     /// Returns the values of a row's key columns.
     fn key_values(&self, row: usize) -> Vec<f64> {
-        (0..self.key_count).map(|key| self.number(key, row)).collect()
+        (0..self.key_count).map(|key| self.number_or_nan(key, row)).collect()
     }
 
     /// Returns the number of a row in the column at a position, NaN where there is none.
-    fn number(&self, position: usize, row: usize) -> f64 {
+    fn number_or_nan(&self, position: usize, row: usize) -> f64 {
         self.cell(position, row).number().unwrap_or(f64::NAN)
     }
 
@@ -139,7 +139,7 @@ impl ComparedFile {
     pub(super) fn key(&self, row: usize) -> Vec<u64> {
         self.matching_columns
             .iter()
-            .map(|&position| rounded_bits(self.number(position, row)))
+            .map(|&position| rounded_bits(self.number_or_nan(position, row)))
             .collect()
     }
 
@@ -188,7 +188,7 @@ impl ComparedFile {
 /// Returns the bits of a number rounded to nine digits.
 fn rounded_bits(value: f64) -> u64 {
     let rounded_text = format!("{value:.8e}");
-    let rounded: f64 = rounded_text.parse().unwrap_or(value);
+    let rounded_value: f64 = rounded_text.parse().unwrap_or(value);
     // Adding zero makes -0 and 0 one value.
-    (rounded + 0.0).to_bits()
+    (rounded_value + 0.0).to_bits()
 }

@@ -99,8 +99,8 @@ fn changed_plan_values_are_named() {
     let mut plan = sample::plan();
     plan["machine"]["body"]["mass_kg"] = json!(20.0);
     plan["set"] = json!({ "body_mass_kg": 20.0 });
-    let second = write_table(sample::map_columns(&RATIOS), &[(key::PLAN, plan)]);
-    let comparison = compare(&map_table(&RATIOS), &second).unwrap();
+    let second_table = write_table(sample::map_columns(&RATIOS), &[(key::PLAN, plan)]);
+    let comparison = compare(&map_table(&RATIOS), &second_table).unwrap();
     let paths: Vec<&str> = comparison.plan.iter().map(|change| change.path.as_str()).collect();
     assert_eq!(paths, ["machine.body.mass_kg", "set"]);
     assert_eq!(
@@ -117,8 +117,8 @@ fn maps_of_different_grids_are_compared_at_common_points() {
     let mut columns = sample::map_columns(&RATIOS[..3]);
     let dampings = [60.0, 70.0 * (1.0 + 1e-15), 90.0].map(Some);
     columns[2] = ("damping_n_s_per_m", "N s/m", number_array(&dampings));
-    let second = write_table(columns, &[(key::PLAN, plan)]);
-    let comparison = compare(&map_table(&RATIOS), &second).unwrap();
+    let second_table = write_table(columns, &[(key::PLAN, plan)]);
+    let comparison = compare(&map_table(&RATIOS), &second_table).unwrap();
     assert_eq!((comparison.shared_rows.len(), comparison.unmatched_rows), (2, [4, 1]));
     assert!(comparison.changed_columns.is_empty(), "{:?}", comparison.changed_columns);
 }
@@ -142,8 +142,8 @@ fn map_with_tolerance(nominal: f64, tolerance: &str, ratios: &[Option<f64>]) -> 
 fn rows_of_different_nominal_values_are_matched_by_point() {
     let mut ratios = RATIOS;
     ratios[0] = Some(2.5); // reliable before
-    let first = map_with_tolerance(100.0, "10 %", &RATIOS);
-    let comparison = compare(&first, &map_with_tolerance(200.0, "10 %", &ratios)).unwrap();
+    let first_table = map_with_tolerance(100.0, "10 %", &RATIOS);
+    let comparison = compare(&first_table, &map_with_tolerance(200.0, "10 %", &ratios)).unwrap();
     assert!(comparison.is_matched_by_point);
     assert_eq!((comparison.shared_rows.len(), comparison.unmatched_rows), (6, [0, 0]));
     assert!(comparison.shared_rows.iter().all(|row| row.rows[0] == row.rows[1]));
@@ -157,16 +157,18 @@ fn rows_of_different_nominal_values_are_matched_by_point() {
         comparison.changed_columns.iter().map(|column| column.name.as_str()).collect();
     assert!(!columns.contains(&"damping_n_s_per_m") && columns.contains(&"ratio_max"));
     // Each file's crossings lie between its own values.
-    let comparison = compare(&first, &map_with_tolerance(200.0, "10 %", &RATIOS)).unwrap();
+    let comparison = compare(&first_table, &map_with_tolerance(200.0, "10 %", &RATIOS)).unwrap();
     assert!(comparison.changed_columns.is_empty() && !comparison.is_empty());
     let brackets = comparison.boundary.unwrap().crossings.remove(0).brackets;
     assert_eq!(brackets, [[100.0, 110.0], [200.0, 210.0]]);
 
     // Equal nominal values match by their axes, and different tolerances make different grids.
     assert!(
-        !compare(&first, &map_with_tolerance(100.0, "10 %", &RATIOS)).unwrap().is_matched_by_point
+        !compare(&first_table, &map_with_tolerance(100.0, "10 %", &RATIOS))
+            .unwrap()
+            .is_matched_by_point
     );
-    let error = compare(&first, &map_with_tolerance(200.0, "5 %", &RATIOS)).unwrap_err();
+    let error = compare(&first_table, &map_with_tolerance(200.0, "5 %", &RATIOS)).unwrap_err();
     assert!(error.to_string().contains("they share no row"), "{error}");
 }
 
@@ -176,8 +178,8 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
         let mut plan = sample::plan();
         plan["axis"].as_array_mut().unwrap().push(json!({ "parameter": "forcing_rad_per_s" }));
         let mut columns = sample::map_columns(&RATIOS);
-        let values: Vec<_> = values.iter().copied().map(Some).collect();
-        columns.insert(3, ("forcing_rad_per_s", "rad/s", number_array(&values)));
+        let spin_values: Vec<_> = spin_values.iter().copied().map(Some).collect();
+        columns.insert(3, ("forcing_rad_per_s", "rad/s", number_array(&spin_values)));
         write_table(columns, &[(key::PLAN, plan)])
     };
     let comparison = compare(&map_table(&RATIOS), &table_with_spins(&[350.0; 6])).unwrap();
@@ -187,8 +189,8 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
     let error = compare(&map_table(&RATIOS), &table_with_two_spins).unwrap_err();
     assert!(matches!(error, ResultsError::Refused(_)));
     assert!(
-        error.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
-        "{error}"
+        message.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
+        "{message}"
     );
 }
 
@@ -196,12 +198,12 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
 fn files_without_common_rows_are_refused_with_the_reason() {
     let mut columns = sample::map_columns(&RATIOS);
     columns[1] = ("unbalance_mass_kg", "kg", number_array(&[Some(0.7); 6]));
-    let second = write_table(columns, &[(key::PLAN, sample::plan())]);
-    let error = compare(&map_table(&RATIOS), &second).unwrap_err().to_string();
-    assert!(error.contains("share no row"), "{error}");
-    let error =
+    let second_table = write_table(columns, &[(key::PLAN, sample::plan())]);
+    let message = compare(&map_table(&RATIOS), &second_table).unwrap_err().to_string();
+    assert!(message.contains("share no row"), "{message}");
+    let message =
         compare(&map_table(&RATIOS), &boundary_table(&[Some(100.0)])).unwrap_err().to_string();
-    assert!(error.contains("are map and boundary"), "{error}");
+    assert!(message.contains("are map and boundary"), "{message}");
 }
 
 #[test]
@@ -248,9 +250,9 @@ fn boundary_table(positions: &[Option<f64>]) -> ResultTable {
 
 #[test]
 fn a_shift_is_certain_only_beyond_the_brackets() {
-    let first = boundary_table(&[Some(100.0), Some(120.0), None, Some(140.0)]);
-    let second = boundary_table(&[Some(100.3), Some(123.0), Some(150.0), Some(140.0)]);
-    let comparison = compare(&first, &second).unwrap();
+    let first_table = boundary_table(&[Some(100.0), Some(120.0), None, Some(140.0)]);
+    let second_table = boundary_table(&[Some(100.3), Some(123.0), Some(150.0), Some(140.0)]);
+    let comparison = compare(&first_table, &second_table).unwrap();
     let shift = comparison.boundary.unwrap();
     assert_eq!((shift.axis.as_str(), shift.unit.as_str()), ("damping_n_s_per_m", "N s/m"));
     assert_eq!((shift.crossings.len(), shift.count_certain_shifts()), (3, 1));

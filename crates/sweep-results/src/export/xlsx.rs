@@ -201,10 +201,10 @@ mod tests {
 
     #[test]
     fn equal_rows_give_equal_workbooks() {
-        let first = encode(&sample::table()).unwrap();
-        assert!(first.starts_with(b"PK\x03\x04"));
+        let first_workbook = encode(&sample::table()).unwrap();
+        assert!(first_workbook.starts_with(b"PK\x03\x04"));
         std::thread::sleep(std::time::Duration::from_millis(1100));
-        assert_eq!(first, encode(&sample::table()).unwrap());
+        assert_eq!(first_workbook, encode(&sample::table()).unwrap());
     }
 
     /// Extracts a file of the workbook, which is a ZIP archive. Its data follow the local header.
@@ -220,10 +220,10 @@ mod tests {
 
     #[test]
     fn rows_have_a_filter_wide_columns_and_frozen_headings() {
-        let sheet = extract(&encode(&sample::table()).unwrap(), "xl/worksheets/sheet1.xml");
+        let sheet_xml = extract(&encode(&sample::table()).unwrap(), "xl/worksheets/sheet1.xml");
         // Two rows of names and units stand above six rows of eleven columns.
         for element in ["<pane ySplit=\"2\"", "state=\"frozen\"", "<autoFilter ref=\"A2:K8\""] {
-            assert!(sheet.contains(element), "{element}: {sheet}");
+            assert!(sheet_xml.contains(element), "{element}: {sheet_xml}");
         }
         let read_number = |text: &str, name: &str| -> f64 {
             let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
@@ -231,7 +231,7 @@ mod tests {
         };
         // Neighbouring columns of equal width share an element.
         let column_width = |column: f64| {
-            let mut elements = sheet.split("<col ").skip(1);
+            let mut elements = sheet_xml.split("<col ").skip(1);
             let is_covered = |text: &&str| {
                 (read_number(text, "min")..=read_number(text, "max")).contains(&column)
             };

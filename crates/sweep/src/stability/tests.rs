@@ -63,8 +63,9 @@ fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
     let starts = StartRule { count: 1, ..StartRule::default() };
-    let result =
-        find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never).remove(0).unwrap();
+    let result = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never)
+        .remove(0)
+        .unwrap();
     let motion = &result.attractors[0];
     assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 4 }));
     let yaw_rad = motion.peaks[Channel::TubYaw.index()];
@@ -78,7 +79,7 @@ fn chaos_that_does_not_last_is_a_transient() {
     let point = point("74001_8");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 306.0 }];
     let result =
-        find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
+        find_attractors(Simd::widest(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
     let result = result.into_iter().next().unwrap().unwrap();
     assert!(result.attractors.iter().all(|motion| motion.motion_kind != Some(MotionKind::Chaotic)));
     let is_transient =
@@ -95,7 +96,7 @@ fn an_attractor_far_from_the_response_is_found_from_rest() {
     let point = point("74001_11");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 404.1 }];
     let result =
-        find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
+        find_attractors(Simd::widest(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
     let result = result.into_iter().next().unwrap().unwrap();
     let is_expected = |motion: &&washer_model::Attractor| {
         motion.motion_kind == Some(MotionKind::Periodic { turns: 4 })
@@ -116,7 +117,7 @@ fn a_textbook_machine_ends_in_its_response() {
     let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let starts = StartRule { count: 3, ..StartRule::default() };
-    let results = find_attractors(Simd::best(), &held_speeds, &[], &starts, Cancel::Never);
+    let results = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never);
     for (result, rpm) in results.into_iter().zip(speeds_rpm) {
         let result = result.unwrap();
         let motion = &result.attractors[0];

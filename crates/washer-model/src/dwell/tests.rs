@@ -20,7 +20,7 @@ const REFERENCE_CHANNELS: [(Channel, &str); 4] = [
 fn prepare_at(keys: &Value, speed_rpm: f64, end_s: f64) -> crate::Point {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-    prepare(Simd::best(), &[(machine(keys), spin)], &timing).remove(0).unwrap()
+    prepare(Simd::widest(), &[(machine(keys), spin)], &timing).remove(0).unwrap()
 }
 
 fn case_point(case: &Value) -> crate::Point {
@@ -60,8 +60,13 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             })
             .collect();
         let start_time = std::time::Instant::now();
-        let search_results =
-            find_attractors(Simd::best(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
+        let search_results = find_attractors(
+            Simd::widest(),
+            &held_speeds,
+            &[],
+            &StartRule::default(),
+            Cancel::Never,
+        );
         println!(
             "{name}: {} speeds in {:.1} s",
             reference_points.len(),
@@ -169,7 +174,7 @@ fn slow_decay_is_not_taken_for_a_doubled_period() {
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 317.0 }];
     let start_rule = StartRule { max_time_s: 120.0, ..StartRule::default() };
     let search_result =
-        find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
+        find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never)
             .remove(0)
             .unwrap();
     assert!((-2e-3..0.0).contains(&search_result.responses[0].growth_per_s()));
@@ -229,7 +234,7 @@ fn random_motions_continue_unchanged_in_short_steps() {
             StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let search_result =
-            find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
+            find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never)
                 .remove(0)
                 .unwrap();
         for motion in &search_result.attractors {
@@ -280,7 +285,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let start_rule = StartRule::default();
         let search_result =
-            find_attractors(Simd::best(), &held_speeds, &[], &start_rule, Cancel::Never)
+            find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never)
                 .remove(0)
                 .unwrap();
         let held_case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
@@ -308,7 +313,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
             .collect();
         let turns = (FOLLOWED_TIME_S / held_case.setup.turn_s()) as usize;
         for (kick, turn_records) in
-            integrate_turns(Simd::best(), &held_states, turns).into_iter().enumerate()
+            integrate_turns(Simd::widest(), &held_states, turns).into_iter().enumerate()
         {
             let peaks = |turns: &[turns::TurnRecord]| -> [f64; CHANNELS] {
                 core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))

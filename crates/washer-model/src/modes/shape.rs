@@ -256,7 +256,7 @@ mod tests {
             }
             let spin = crate::Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
             let timing = crate::Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-            let points = crate::prepare(lane_ode::Simd::best(), &[(machine, spin)], &timing);
+            let points = crate::prepare(lane_ode::Simd::widest(), &[(machine, spin)], &timing);
             let Some(Ok(point)) = points.into_iter().next() else { continue };
             let modes = crate::modes::modes(&point, 0.0, 10.0).unwrap();
             for mode in &modes.modes[..4] {

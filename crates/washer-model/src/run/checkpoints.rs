@@ -40,7 +40,7 @@ mod tests {
     fn rounding_noise_is_no_separation() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 2.0 };
         let timing = Timing { end_s: 2.0, window_s: [0.0, 2.0], checkpoints: 4 };
-        let point = prepare(Simd::best(), &[(Machine::paper(), spin)], &timing).remove(0);
+        let point = prepare(Simd::widest(), &[(Machine::paper(), spin)], &timing).remove(0);
         let point = point.unwrap();
         let checkpoints_at = |deviation: f64| {
             let coordinates = point.equilibrium.map(|q| q + deviation);

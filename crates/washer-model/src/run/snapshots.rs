@@ -171,7 +171,7 @@ mod tests {
             .into();
         let interval_s = 0.0137;
         let instants_s: Arc<[f64]> = (0..=218).map(|k| f64::from(k) * interval_s).collect();
-        let points: Vec<Point> = prepare(Simd::best(), &machines, &timing)
+        let points: Vec<Point> = prepare(Simd::widest(), &machines, &timing)
             .into_iter()
             .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants_s)))
             .collect();
@@ -180,7 +180,7 @@ mod tests {
         for model in ModelKind::ALL {
             let all_points: Vec<&Point> = points.iter().collect();
             let (_, readings_in_lanes) =
-                simulate_with(Simd::best(), model, &method, &all_points, recorders);
+                simulate_with(Simd::widest(), model, &method, &all_points, recorders);
             let (_, single_reading) =
                 simulate_with(Simd::Scalar, model, &method, &all_points[1..2], recorders);
             assert_eq!(readings_in_lanes[1].snapshots, single_reading[0].snapshots);

@@ -140,7 +140,7 @@ pub(crate) fn compute_turns(requests: &[TurnRequest<'_>], cancel: Cancel<'_>) ->
         if is_narrow_enough && !fills_lanes {
             Simd::dispatch_narrow(kernel)
         } else {
-            Simd::best().dispatch(kernel)
+            Simd::widest().dispatch(kernel)
         }
     })
 }

@@ -24,7 +24,7 @@ const TIMING: Timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints:
 
 pub(super) fn prepared(machine: Machine, speed_rpm: f64) -> Point {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
-    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+    prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
 fn machine_of_case(case: &Value) -> Machine {

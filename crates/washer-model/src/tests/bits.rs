@@ -110,27 +110,27 @@ fn assert_same_on_every_instruction_set(scenarios: &[BitsScenario]) {
 
 fn assert_same_at_any_position(scenarios: &[BitsScenario]) {
     let count = scenarios.len();
-    let in_order = simulate_batch(Simd::best(), scenarios);
+    let in_order = simulate_batch(Simd::widest(), scenarios);
     for shift in [1, 2, 3, 5, 7] {
         let order: Vec<_> = (0..count).map(|i| (i + shift) % count).collect();
         let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
         assert!(
-            simulate_batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
+            simulate_batch(Simd::widest(), &reordered) == select_scenarios(&in_order, &order),
             "moved by {shift}"
         );
     }
     let order: Vec<_> = (0..count).rev().collect();
     let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
     assert!(
-        simulate_batch(Simd::best(), &reordered) == select_scenarios(&in_order, &order),
+        simulate_batch(Simd::widest(), &reordered) == select_scenarios(&in_order, &order),
         "backwards"
     );
 }
 
 fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
-    let together = simulate_batch(Simd::best(), scenarios);
+    let together = simulate_batch(Simd::widest(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
-        let alone = simulate_batch(Simd::best(), core::slice::from_ref(scenario));
+        let alone = simulate_batch(Simd::widest(), core::slice::from_ref(scenario));
         assert!(alone == select_scenarios(&together, &[i]), "scenario {i} alone");
     }
     // Two consecutive points fail, one early and one late, and other points start in their lanes.
@@ -141,7 +141,7 @@ fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
     mixed_scenarios.insert(1, failing_scenario(0.02));
     mixed_scenarios.insert(5, failing_scenario(0.3));
     let other_points: Vec<_> = (0..mixed_scenarios.len()).filter(|i| ![1, 5].contains(i)).collect();
-    let results_beside_failing = simulate_batch(Simd::best(), &mixed_scenarios);
+    let results_beside_failing = simulate_batch(Simd::widest(), &mixed_scenarios);
     let nonlinear = &results_beside_failing[0];
     assert!(
         [1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()),
@@ -195,7 +195,7 @@ fn blocks_of_steps_do_not_change_bits() {
     });
     let scenarios: Vec<_> =
         spins.into_iter().map(|spin| (paper_machine(0.4, 90.0), spin)).collect();
-    let simd = Simd::best();
+    let simd = Simd::widest();
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all_points: Vec<_> = points.iter().collect();
@@ -228,7 +228,7 @@ fn every_method_stops_within_a_segment() {
         paper_machine(0.4, 90.0),
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 },
     );
-    let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
+    let point = prepare(Simd::widest(), &[scenario], &timing).remove(0).unwrap();
     let tolerance =
         Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000, longest_step_s: None };
     let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
@@ -240,7 +240,7 @@ fn every_method_stops_within_a_segment() {
                 call_count.store(0, Ordering::Relaxed);
                 let must_stop = || call_count.fetch_add(1, Ordering::Relaxed) >= max_calls;
                 simulate_until(
-                    Simd::best(),
+                    Simd::widest(),
                     model,
                     &method,
                     &[&point],

@@ -9,7 +9,7 @@ fn simulate_both_models(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let scenarios: Vec<_> =
         points.iter().map(|&(m, c)| (paper_machine(m, c), triangular_spin())).collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
-    let simd = Simd::best();
+    let simd = Simd::widest();
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();

@@ -34,7 +34,7 @@ pub(crate) fn machine(
 fn prepared(machines: &[Machine]) -> Vec<Point> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 12.0 };
     let points: Vec<_> = machines.iter().map(|machine| (machine.clone(), spin.clone())).collect();
-    prepare(Simd::best(), &points, &TIMING).into_iter().map(Result::unwrap).collect()
+    prepare(Simd::widest(), &points, &TIMING).into_iter().map(Result::unwrap).collect()
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     let point_references: Vec<&Point> = points.iter().collect();
     let (_, readings) =
-        simulate_with(Simd::best(), ModelKind::Linear, &method, &point_references, recorders);
+        simulate_with(Simd::widest(), ModelKind::Linear, &method, &point_references, recorders);
     for ((point, reading), machine) in points.iter().zip(&readings).zip(&machines) {
         let speeds = reading.gauge_values(Gauge::DamperSpeed);
         let factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
@@ -87,7 +87,7 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
             }
             let point = prepared(&[machine]).remove(0);
             let (_, readings) =
-                simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point], recorders);
+                simulate_with(Simd::widest(), ModelKind::Linear, &method, &[&point], recorders);
             let reciprocals =
                 readings[0].gauge_values(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
             reciprocals.collect()
@@ -135,7 +135,7 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3.4);
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 265.13, ramp_s: 8.0 };
     let timing = Timing { end_s: 30.0, window_s: [10.0, 30.0], checkpoints: 0 };
-    let point = prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap();
+    let point = prepare(Simd::widest(), &[(machine, spin)], &timing).remove(0).unwrap();
     let expected_m_per_s = [0.622_071, 0.388_478];
     assert_eq!(point.friction_speeds().len(), 2);
     for (friction_speed, expected) in point.friction_speeds().iter().zip(expected_m_per_s) {

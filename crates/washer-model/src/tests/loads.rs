@@ -25,7 +25,7 @@ fn with_cabinet(mut machine: Machine) -> Machine {
 
 fn prepare_ramp_point(machine: Machine) -> Point {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 2.0 };
-    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+    prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
 /// Returns the least of each number over all instants.
@@ -167,7 +167,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let hit_stops =
         stop_forces_n.iter().zip(&contact_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
     assert!(hit_stops.count() >= 2, "{stop_forces_n:?} N, {contact_s:?} s");
-    let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
+    let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::widest());
     assert_close("least load of foot", reading.gauge_values(Gauge::FootLoad), &foot_loads_n, 1e-2);
     assert_close("margin", reading.gauge_values(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
     assert_close("walking", reading.gauge_values(Gauge::WalkMargin), &[walk_margin_n], 0.1);
@@ -228,7 +228,7 @@ fn loads_of_the_linear_model_agree_with_its_history() {
     let negated_stops_n =
         minima(forces.iter().map(|forces| forces.stop_forces_n.iter().map(|n| -n).collect()));
     let stop_forces_n: Vec<f64> = negated_stops_n.iter().map(|negated_n| -negated_n).collect();
-    let reading = read_gauges(&point, ModelKind::Linear, Simd::best());
+    let reading = read_gauges(&point, ModelKind::Linear, Simd::widest());
     let at_rest = history.forces(0).unwrap();
     assert!(
         at_rest.foot_loads_n.iter().zip(&foot_loads_n).all(|(rest_n, n)| rest_n - n > 10.0),
@@ -275,7 +275,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
     let at_rest = compute_load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
     let min_rest_load_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-        let reading = read_gauges(&point, model, Simd::best());
+        let reading = read_gauges(&point, model, Simd::widest());
         min_rest_load_n
             - reading.gauge_values(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
     });
@@ -286,7 +286,7 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
 #[test]
 fn a_machine_without_stops_and_cabinet_has_only_damper_speeds() {
     let point = prepare_ramp_point(Machine::paper());
-    let mut reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
+    let mut reading = read_gauges(&point, ModelKind::Nonlinear, Simd::widest());
     let speeds = core::mem::take(&mut reading.gauges[Gauge::DamperSpeed as usize]);
     assert_eq!((speeds.len(), reading), (2, Reading::default()));
 }

@@ -17,7 +17,7 @@ fn point() -> Point {
     let machine = Machine { radial_clearance_m: 0.4e-3, ..paper_machine(0.8, 120.0) };
     let spin =
         Spin::Table { time_s: vec![0.0, 1.0, 3.0, 4.0], speed_rpm: vec![0.0, 100.0, 420.0, 300.0] };
-    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+    prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
 /// The readings that are computed from a history.
@@ -70,10 +70,10 @@ fn readings_agree_with_densely_sampled_histories() {
     let method = Method::rk4(2e-4);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (records, readings) =
-            simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS);
+            simulate_with(Simd::widest(), model, &method, &[&point], ALL_RECORDERS);
         assert_eq!(
             records,
-            simulate(Simd::best(), model, &method, &[&point]),
+            simulate(Simd::widest(), model, &method, &[&point]),
             "recorders do not change peaks"
         );
         let reading = &readings[0];
@@ -126,7 +126,7 @@ fn readings_do_not_depend_on_the_method() {
         Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000, longest_step_s: None };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let run = |method| {
-            simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
+            simulate_with(Simd::widest(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
         };
         let reference = run(Method::rk4(2e-4));
         for reading in [run(Method::dopri5(tolerance)), run(Method::additive(tolerance))] {
@@ -164,7 +164,7 @@ fn recorders_that_are_not_in_use_leave_no_readings() {
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
     let method = Method::capped(MethodKind::Capped0, 1e-3, caps);
     let run = |recorders| {
-        simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], recorders)
+        simulate_with(Simd::widest(), ModelKind::Linear, &method, &[&point, &point], recorders)
     };
     assert!(run(Recorders::default()).1.is_empty());
     let (_, readings) = run(Recorders::with_gauge(Gauge::ClashTime));
@@ -184,10 +184,10 @@ fn at_rest_the_cabinet_carries_the_weight() {
         * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
     let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02], checkpoints: 0 };
     let zero_spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
-    let point = prepare(Simd::best(), &[(machine, zero_spin)], &timing).remove(0).unwrap();
+    let point = prepare(Simd::widest(), &[(machine, zero_spin)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (_, readings) =
-            simulate_with(Simd::best(), model, &Method::rk4(2e-4), &[&point], ALL_RECORDERS);
+            simulate_with(Simd::widest(), model, &Method::rk4(2e-4), &[&point], ALL_RECORDERS);
         // The springs also have a small force along c1, which the model's constraint balances.
         assert_close("force", readings[0].gauge_values(Gauge::CabinetForce)[0], weight_n, 1e-4);
         assert_eq!(readings[0].gauge_values(Gauge::ClashTime), [0.0]);
@@ -200,7 +200,7 @@ fn the_sag_of_the_papers_machine_agrees_with_the_model_page() {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let machine = Machine::paper();
     let centre_m = machine.tub.centre_x_m;
-    let point = prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap();
+    let point = prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap();
     // At equilibrium q1 = -14.0969 mm and q6 = 3.3526 mrad.
     let expected = 14.0969e-3 - centre_m * 3.3526e-3_f64.sin();
     assert!((point.static_sag_m() - expected).abs() < 1e-7, "{}", point.static_sag_m());

@@ -186,7 +186,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
         })
         .collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
-    let simd = Simd::best();
+    let simd = Simd::widest();
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let points: Vec<_> = points.iter().collect();

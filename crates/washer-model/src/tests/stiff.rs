@@ -15,7 +15,7 @@ fn point(bearing_stiffness_n_per_m: f64) -> Point {
     machine.bearings.rear_stiffness_n_per_m = bearing_stiffness_n_per_m;
     let spin =
         Spin::Table { time_s: vec![0.0, 0.5, 1.5, 2.5], speed_rpm: vec![0.0, 100.0, 400.0, 300.0] };
-    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+    prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
 fn tolerance(relative: f64) -> Tolerance {
@@ -23,7 +23,7 @@ fn tolerance(relative: f64) -> Tolerance {
 }
 
 fn simulate_point(model: ModelKind, method: &Method, point: &Point) -> Record {
-    simulate(Simd::best(), model, method, &[point]).remove(0)
+    simulate(Simd::widest(), model, method, &[point]).remove(0)
 }
 
 /// Returns the greatest relative difference of two records' amplitudes and least gaps.
@@ -78,7 +78,7 @@ fn records_of_stiff_bearings_do_not_depend_on_other_points() {
     let method = Method::additive(tolerance(1e-5));
     for model in ModelKind::ALL {
         let together = simulate(Simd::Scalar, model, &method, &all_points);
-        assert_eq!(simulate(Simd::best(), model, &method, &all_points), together, "{model:?}");
+        assert_eq!(simulate(Simd::widest(), model, &method, &all_points), together, "{model:?}");
         for (point, record) in all_points.iter().zip(together) {
             assert_eq!(simulate_point(model, &method, point), record, "{model:?}");
         }
