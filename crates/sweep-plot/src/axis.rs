@@ -51,16 +51,20 @@ impl AxisScale {
 
     /// Returns the position of a value: 0 at the start of the scale, 1 at its end.
     pub(crate) fn position(self, value: f64) -> f64 {
-        let start = self.coordinate(self.from);
-        let end = self.coordinate(self.to);
-        (self.coordinate(value) - start) / (end - start)
+        let start_coordinate = self.coordinate(self.from);
+        let end_coordinate = self.coordinate(self.to);
+        (self.coordinate(value) - start_coordinate) / (end_coordinate - start_coordinate)
     }
 
     /// Returns about `count` round values within the scale.
     pub(crate) fn ticks(self, count: usize) -> Vec<Tick> {
-        let low = self.from.min(self.to);
-        let high = self.from.max(self.to);
-        if self.is_log { log_ticks(low, high, count) } else { linear_ticks(low, high, count) }
+        let low_end = self.from.min(self.to);
+        let high_end = self.from.max(self.to);
+        if self.is_log {
+            log_ticks(low_end, high_end, count)
+        } else {
+            linear_ticks(low_end, high_end, count)
+        }
     }
 }
 
@@ -130,13 +134,13 @@ fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     // A step may give fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
     // labels of neighbouring ticks differ.
     while step.length() > shortest_length {
-        let length = step.length();
+        let step_length = step.length();
         let decimals = step.decimals();
-        let first_multiple = (low / length - 1e-9).ceil() as i64;
-        let last_multiple = (high / length + 1e-9).floor() as i64;
+        let first_multiple = (low / step_length - 1e-9).ceil() as i64;
+        let last_multiple = (high / step_length + 1e-9).floor() as i64;
         if last_multiple - first_multiple + 1 >= MIN_TICKS {
             let tick = |k: i64| {
-                let value = k as f64 * length;
+                let value = k as f64 * step_length;
                 let label = match decimals {
                     None if value != 0.0 => format!("{value:e}"),
                     _ => format!("{value:.*}", decimals.unwrap_or_default()),
@@ -174,9 +178,9 @@ pub(crate) fn log_tick_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
     ];
     tick_sets.map(|factors| {
         let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
-        let values =
+        let tick_values =
             powers.flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)));
-        values
+        tick_values
             .filter(|value| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value))
             .map(|value| Tick { value, label: label::format_significant(value, 2) })
             .collect()

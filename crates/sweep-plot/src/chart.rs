@@ -221,12 +221,14 @@ pub(crate) fn panel_y_scale(panel: &ChartPanel) -> AxisScale {
         SeriesStyle::Band(low, high) => [&low[..], &high[..]],
         _ => [&series.y[..], &[]],
     });
-    let values = value_lists.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
+    let shown_values =
+        value_lists.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
     if panel.is_log {
-        let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
+        let (low, high) =
+            extremes(shown_values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
         AxisScale::logarithmic(low / 1.15, high * 1.15)
     } else {
-        AxisScale::around_values(values)
+        AxisScale::around_values(shown_values)
     }
 }
 
@@ -293,8 +295,8 @@ fn draw_panel(
             scene.fill_outline(outline, series.colour.with_alpha(90));
         }
         if series.style == SeriesStyle::Dots {
-            let points = (0..xs.len()).filter_map(|k| sample_pixel(&series.y, k));
-            dots.extend(points.map(|point| (point, DOT_RADIUS, series.colour)));
+            let pixels = (0..xs.len()).filter_map(|k| sample_pixel(&series.y, k));
+            dots.extend(pixels.map(|point| (point, DOT_RADIUS, series.colour)));
             continue;
         }
         let indices = envelope_indices(
@@ -304,9 +306,9 @@ fn draw_panel(
             panel.x_scale.to,
             panel.width as usize,
         );
-        let points: Vec<_> = indices.into_iter().map(|k| sample_pixel(&series.y, k)).collect();
+        let pixels: Vec<_> = indices.into_iter().map(|k| sample_pixel(&series.y, k)).collect();
         let mut outline = Outline::default();
-        let isolated_points = outline.add_runs(&points);
+        let isolated_points = outline.add_runs(&pixels);
         scene.draw_line(outline, series_stroke(series));
         dots.extend(
             isolated_points.into_iter().map(|point| (point, ISOLATED_RADIUS, series.colour)),
@@ -378,12 +380,12 @@ fn draw_stars(scene: &mut Scene, chart_panel: &ChartPanel, panel: &Panel) {
                         || top > rectangle[3]
                 })
         };
-        let position = candidates.filter(is_unobstructed).min_by_key(|position| {
-            count_curves_through(chart_panel, panel, text_extent(*position))
+        let label_position = candidates.filter(is_unobstructed).min_by_key(|label_position| {
+            count_curves_through(chart_panel, panel, text_extent(*label_position))
         });
-        let position = position.unwrap_or([x_candidates[1], y + 18.0]);
-        occupied_areas.push(text_extent(position));
-        let text = Text::new(label.clone(), position, TICK_SIZE).with_bold_face();
+        let label_position = label_position.unwrap_or([x_candidates[1], y + 18.0]);
+        occupied_areas.push(text_extent(label_position));
+        let text = Text::new(label.clone(), label_position, TICK_SIZE).with_bold_face();
         scene.draw_text(Text { halo: Some(PAPER), ..text });
     }
 }
@@ -391,9 +393,9 @@ fn draw_stars(scene: &mut Scene, chart_panel: &ChartPanel, panel: &Panel) {
 /// Returns the number of curves of a panel that pass through a rectangle.
 fn count_curves_through(chart_panel: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
     let passes_through = |series: &&Series| {
-        let points = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.pixel(x, y));
-        let points: Vec<[f64; 2]> = points.collect();
-        points.windows(2).any(|pair| segment_intersects([pair[0], pair[1]], extent))
+        let pixels = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.pixel(x, y));
+        let pixels: Vec<[f64; 2]> = pixels.collect();
+        pixels.windows(2).any(|pair| segment_intersects([pair[0], pair[1]], extent))
     };
     chart_panel.series.iter().filter(passes_through).count()
 }

@@ -48,19 +48,19 @@ pub fn zero_lines(
 fn segments_in_square(
     i: usize,
     j: usize,
-    value: &impl Fn(usize, usize) -> f64,
+    value_at: &impl Fn(usize, usize) -> f64,
 ) -> Vec<(GridEdge, GridEdge)> {
     // The corners run counter-clockwise from the lower left.
     let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-    let corner_values = nodes.map(|(i, j)| value(i, j));
+    let corner_values = nodes.map(|(i, j)| value_at(i, j));
     let is_above = corner_values.map(|corner| corner >= 0.0);
     let known_corners: Vec<usize> = (0..4).filter(|&k| corner_values[k].is_finite()).collect();
     if known_corners.len() < 3 {
         return Vec::new();
     }
-    let sides = (0..known_corners.len())
+    let square_sides = (0..known_corners.len())
         .map(|k| (known_corners[k], known_corners[(k + 1) % known_corners.len()]));
-    let crossed_sides = sides.filter(|&(from, to)| is_above[from] != is_above[to]);
+    let crossed_sides = square_sides.filter(|&(from, to)| is_above[from] != is_above[to]);
     let crossed_sides: Vec<GridEdge> =
         crossed_sides.map(|(from, to)| edge_between(nodes[from], nodes[to])).collect();
     match crossed_sides[..] {
@@ -79,10 +79,10 @@ fn find_crossing(
     (from, (y, x)): GridEdge,
     xs: &[f64],
     ys: &[f64],
-    value: &impl Fn(usize, usize) -> f64,
+    value_at: &impl Fn(usize, usize) -> f64,
 ) -> [f64; 2] {
-    let start_value = value(from.0, from.1);
-    let end_value = value(x, y);
+    let start_value = value_at(from.0, from.1);
+    let end_value = value_at(x, y);
     let fraction = start_value / (start_value - end_value);
     [xs[from.0] + fraction * (xs[x] - xs[from.0]), ys[from.1] + fraction * (ys[y] - ys[from.1])]
 }
@@ -143,33 +143,34 @@ mod tests {
 
     #[test]
     fn the_level_line_of_a_plane_is_straight() {
-        let lines = zero_lines(&numbers_below(6), &numbers_below(5), |i, j| {
+        let found_lines = zero_lines(&numbers_below(6), &numbers_below(5), |i, j| {
             2.0 * i as f64 + j as f64 - 5.5
         });
-        assert_eq!(lines.len(), 1);
-        assert!(lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
+        assert_eq!(found_lines.len(), 1);
+        assert!(found_lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
         let is_on_border = |[x, y]: [f64; 2]| x == 0.0 || x == 5.0 || y == 0.0 || y == 4.0;
-        assert!(is_on_border(lines[0][0]) && is_on_border(*lines[0].last().unwrap()));
+        assert!(is_on_border(found_lines[0][0]) && is_on_border(*found_lines[0].last().unwrap()));
     }
 
     #[test]
     fn a_line_around_one_node_is_closed() {
-        let lines = zero_lines(&numbers_below(5), &numbers_below(5), |i, j| {
+        let found_lines = zero_lines(&numbers_below(5), &numbers_below(5), |i, j| {
             if (i, j) == (2, 2) { 1.0 } else { -1.0 }
         });
-        assert_eq!(lines.len(), 1);
-        assert_eq!(lines[0].len(), 5);
-        assert_eq!(lines[0].first(), lines[0].last());
+        assert_eq!(found_lines.len(), 1);
+        assert_eq!(found_lines[0].len(), 5);
+        assert_eq!(found_lines[0].first(), found_lines[0].last());
     }
 
     #[test]
     fn the_two_lines_of_a_saddle_do_not_meet() {
         let saddle_corners = [[1.0, -1.0], [-1.0, 3.0]];
-        let lines = zero_lines(&numbers_below(2), &numbers_below(2), |i, j| saddle_corners[i][j]);
+        let found_lines =
+            zero_lines(&numbers_below(2), &numbers_below(2), |i, j| saddle_corners[i][j]);
         // The mean of the corners is positive, so that the positive corners are connected and the
         // negative ones cut off.
-        assert_eq!(lines.len(), 2);
-        for line in lines {
+        assert_eq!(found_lines.len(), 2);
+        for line in found_lines {
             let cut_off = if line[0][0] + line[1][0] > line[0][1] + line[1][1] {
                 [1.0, 0.0]
             } else {
@@ -184,19 +185,23 @@ mod tests {
     #[test]
     fn no_line_is_drawn_beside_unknown_values() {
         let is_unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
-        let value = |i: usize, j: usize| if is_unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
-        let lines = zero_lines(&numbers_below(5), &numbers_below(6), value);
-        assert!(lines.iter().flatten().all(|point| point.iter().all(|c| c.is_finite())));
-        assert!(lines.iter().flatten().all(|[_, y]| *y <= 0.5 || *y >= 3.0 - 0.5));
+        let value_at =
+            |i: usize, j: usize| if is_unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
+        let found_lines = zero_lines(&numbers_below(5), &numbers_below(6), value_at);
+        assert!(found_lines.iter().flatten().all(|point| point.iter().all(|c| c.is_finite())));
+        assert!(found_lines.iter().flatten().all(|[_, y]| *y <= 0.5 || *y >= 3.0 - 0.5));
         let total_extent: f64 =
-            lines.iter().map(|line| (line[0][1] - line[line.len() - 1][1]).abs()).sum();
-        assert!(total_extent > 1.9, "the line runs on where all corners are known: {lines:?}");
+            found_lines.iter().map(|line| (line[0][1] - line[line.len() - 1][1]).abs()).sum();
+        assert!(
+            total_extent > 1.9,
+            "the line runs on where all corners are known: {found_lines:?}"
+        );
     }
 
     #[test]
     fn a_value_at_the_level_belongs_to_the_upper_side() {
-        let lines = zero_lines(&numbers_below(3), &numbers_below(2), |i, _| i as f64 - 1.0);
-        assert_eq!(lines, [[[1.0, 0.0], [1.0, 1.0]]]);
+        let found_lines = zero_lines(&numbers_below(3), &numbers_below(2), |i, _| i as f64 - 1.0);
+        assert_eq!(found_lines, [[[1.0, 0.0], [1.0, 1.0]]]);
     }
 
     #[test]

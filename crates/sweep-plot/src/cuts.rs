@@ -182,16 +182,16 @@ fn find_fixed_indices(
                 let valid_values = list_names(further_axes.iter().map(|axis| axis.name.as_str()));
                 unknown_error("axis beyond the second", valid_values)
             })?;
-        let values = &further_axes[axis_index].values;
+        let axis_values = &further_axes[axis_index].values;
         let value_index =
-            values.iter().position(|&axis_value| SweptAxis::is_same_value(axis_value, *value));
+            axis_values.iter().position(|&axis_value| SweptAxis::is_same_value(axis_value, *value));
         fixed_values[axis_index] = Some(value_index.ok_or_else(|| {
             let format_value = |value: &f64| label::format_significant(*value, 6);
-            let valid_values = match &values[..] {
-                [first, .., last] if values.len() > MAX_LISTED_VALUES => {
+            let valid_values = match &axis_values[..] {
+                [first, .., last] if axis_values.len() > MAX_LISTED_VALUES => {
                     format!(
                         "{} of them from {} to {}",
-                        values.len(),
+                        axis_values.len(),
                         format_value(first),
                         format_value(last)
                     )

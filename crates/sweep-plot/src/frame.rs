@@ -156,9 +156,10 @@ impl Panel {
             let y = self.y_pixel(tick.value);
             tick_marks.add_line(&[[self.x - 5.0, y], [self.x, y]]);
             if has_y_numbers {
-                let position = [self.x - 9.0, y + 0.35 * TICK_SIZE];
-                scene
-                    .draw_text(Text::new(tick.label, position, TICK_SIZE).with_anchor(Anchor::End));
+                let text_position = [self.x - 9.0, y + 0.35 * TICK_SIZE];
+                scene.draw_text(
+                    Text::new(tick.label, text_position, TICK_SIZE).with_anchor(Anchor::End),
+                );
             }
         }
         scene.draw_line(tick_marks, stroke);
@@ -166,15 +167,16 @@ impl Panel {
 
     /// Writes a line of text in the middle of the panel: the reason for an empty panel.
     pub(crate) fn write_centred(&self, scene: &mut Scene, text: &str) {
-        let position = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
-        let text = Text::new(text, position, LABEL_SIZE).with_anchor(Anchor::Middle);
+        let text_position =
+            [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
+        let text = Text::new(text, text_position, LABEL_SIZE).with_anchor(Anchor::Middle);
         scene.draw_text(Text { colour: MUTED_COLOUR, ..text });
     }
 
     /// Writes the label of the x axis.
     pub(crate) fn draw_x_label(&self, scene: &mut Scene, label: &str) {
-        let position = [self.x + self.width / 2.0, self.y + self.height + 44.0];
-        scene.draw_text(Text::new(label, position, LABEL_SIZE).with_anchor(Anchor::Middle));
+        let text_position = [self.x + self.width / 2.0, self.y + self.height + 44.0];
+        scene.draw_text(Text::new(label, text_position, LABEL_SIZE).with_anchor(Anchor::Middle));
     }
 
     /// Writes the label of the y axis, `distance` px left of the panel; in two lines if it is
@@ -185,15 +187,17 @@ impl Panel {
         let words_end = label.rfind(" (").map_or(label.len(), |index| index + 1);
         let space_indices = label[..words_end].match_indices(' ').map(|(index, _)| index);
         let break_index = { space_indices }.rfind(|&index| fits_height(&label[..index]));
-        let lines = match break_index {
+        let label_lines = match break_index {
             Some(index) if !fits_height(label) => vec![&label[..index], &label[index + 1..]],
             _ => vec![label],
         };
-        let first_x = self.x - distance - (lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
-        for (k, line) in lines.into_iter().enumerate() {
-            let position = [first_x + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
+        let first_x = self.x - distance - (label_lines.len() - 1) as f64 * 0.62 * LABEL_SIZE;
+        for (k, line) in label_lines.into_iter().enumerate() {
+            let text_position = [first_x + 1.2 * LABEL_SIZE * k as f64, self.y + self.height / 2.0];
             scene.draw_text(
-                Text::new(line, position, LABEL_SIZE).with_anchor(Anchor::Middle).with_rotation(),
+                Text::new(line, text_position, LABEL_SIZE)
+                    .with_anchor(Anchor::Middle)
+                    .with_rotation(),
             );
         }
     }

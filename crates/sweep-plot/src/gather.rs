@@ -89,14 +89,14 @@ impl CellMap {
     /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::NotAGrid`] for two rows at one
     /// point.
     pub(crate) fn read(source: FigureFile, grid: Grid, columns: &[String]) -> Result<Self> {
-        let names = grid.axes.iter().map(|axis| axis.swept_axis.name.as_str());
-        let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
+        let column_names = grid.axes.iter().map(|axis| axis.swept_axis.name.as_str());
+        let column_names = column_names.chain(["status", "reliable", "sensitive", "ratio_max"]);
         let shown_facts: Vec<&ColumnFacts> =
             source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
-        let names: Vec<&str> =
-            names.chain(shown_facts.iter().map(|facts| facts.name.as_str())).collect();
+        let column_names: Vec<&str> =
+            column_names.chain(shown_facts.iter().map(|facts| facts.name.as_str())).collect();
         let mut collector = CellCollector::new(&source, &grid, &shown_facts);
-        source.each_row(&names, |row| collector.add(row))?;
+        source.each_row(&column_names, |row| collector.add(row))?;
         let CellCollector { columns, point_counts, rows_by_status, .. } = collector;
         let mut ranges_and_sides = BTreeMap::new();
         let mut figure_columns = Vec::with_capacity(columns.len());
@@ -130,10 +130,10 @@ impl CellMap {
 
     /// Returns the status of a cell's points; `None` if they differ.
     pub(crate) fn common_status(&self, cell: usize) -> Option<&str> {
-        let words = self.table.column("status").and_then(FigureColumn::words)?;
-        match words.codes.get(cell) {
+        let status_words = self.table.column("status").and_then(FigureColumn::words)?;
+        match status_words.codes.get(cell) {
             Some(&SEVERAL_WORDS) => None,
-            _ => Some(words.get(cell).unwrap_or(UNKNOWN_STATUS)),
+            _ => Some(status_words.get(cell).unwrap_or(UNKNOWN_STATUS)),
         }
     }
 
@@ -282,14 +282,14 @@ impl<'a> CellCollector<'a> {
             cell = cell.zip(last_value.1).map(|(cell, index)| cell * axis.values.len() + index);
         }
         let axis_count = self.last_values.len();
-        let status = row.word(axis_count);
-        let status_name = status.unwrap_or(UNKNOWN_STATUS);
+        let row_status = row.word(axis_count);
+        let status_name = row_status.unwrap_or(UNKNOWN_STATUS);
         match self.rows_by_status.get_mut(status_name) {
             Some(rows) => *rows += 1,
             None => drop(self.rows_by_status.insert(status_name.to_owned(), 1)),
         }
-        let has_failed = status != Some(OK_STATUS);
-        let is_worst = cell.map(|cell| self.count(cell, row, has_failed)).transpose()?;
+        let has_failed = row_status != Some(OK_STATUS);
+        let is_worst = cell.map(|cell| self.count_point(cell, row, has_failed)).transpose()?;
         for (column, collector) in (axis_count + 4..).zip(&mut self.columns) {
             collector.add((row, column), cell.zip(is_worst), has_failed);
         }
@@ -298,7 +298,7 @@ impl<'a> CellCollector<'a> {
 
     /// Counts the kind of a row's point. Returns whether its ratio is the greatest of its cell so
     /// far.
-    fn count(&mut self, cell: usize, row: FigureRow<'_>, has_failed: bool) -> Result<bool> {
+    fn count_point(&mut self, cell: usize, row: FigureRow<'_>, has_failed: bool) -> Result<bool> {
         let axis_count = self.last_values.len();
         let point_counts = &mut self.point_counts[cell];
         let holds_all = |points| point_counts.points as usize >= points;

@@ -66,12 +66,12 @@ impl GridAxis {
         if size == 1 {
             return Self { lookup, ..Self::new(axis, axis.values.clone(), borders) };
         }
-        let values = block_ends
+        let block_values = block_ends
             .iter()
             .map(|block| axis.from_coordinate(middle_coordinate(*block)))
             .collect();
         let spans = block_ends.iter().map(|block| block.map(|end| axis.values[end])).collect();
-        Self { spans: Some(spans), lookup, ..Self::new(axis, values, borders) }
+        Self { spans: Some(spans), lookup, ..Self::new(axis, block_values, borders) }
     }
 
     /// Returns an axis that is known by its range alone, in `count` equal cells.
@@ -81,17 +81,17 @@ impl GridAxis {
             |k: usize| coordinates[0] + (coordinates[1] - coordinates[0]) * k as f64 / count as f64;
         let borders: Vec<f64> =
             (0..=count).map(|k| axis.from_coordinate(border_coordinate(k))).collect();
-        let values = (0..count)
+        let cell_values = (0..count)
             .map(|k| axis.from_coordinate((border_coordinate(k) + border_coordinate(k + 1)) / 2.0))
             .collect();
         let spans = borders.windows(2).map(|pair| [pair[0], pair[1]]).collect();
-        Self { spans: Some(spans), ..Self::new(axis, values, borders) }
+        Self { spans: Some(spans), ..Self::new(axis, cell_values, borders) }
     }
 
     /// Returns an axis with cells for some picked values.
     fn with_picks(axis: &SweptAxis, picks: &[usize]) -> Self {
-        let values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
-        let axis_of_picks = SweptAxis { values, ..axis.clone() };
+        let picked_values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
+        let axis_of_picks = SweptAxis { values: picked_values, ..axis.clone() };
         Self { lookup: CellLookup::Picked, ..Self::with_blocks(&axis_of_picks, 1) }
     }
 
@@ -119,13 +119,14 @@ impl GridAxis {
 
     /// Returns the index of the cell of one of the axis' values; `None` if it is not shown.
     pub(crate) fn cell_index(&self, value: f64) -> Option<usize> {
-        let values = &self.swept_axis.values;
-        let value_index = values.partition_point(|known| *known < value);
+        let axis_values = &self.swept_axis.values;
+        let value_index = axis_values.partition_point(|known| *known < value);
         match self.lookup {
-            CellLookup::Blocks(size) => Some(value_index.min(values.len() - 1) / size),
-            CellLookup::Picked => {
-                values.get(value_index).is_some_and(|known| *known == value).then_some(value_index)
-            }
+            CellLookup::Blocks(size) => Some(value_index.min(axis_values.len() - 1) / size),
+            CellLookup::Picked => axis_values
+                .get(value_index)
+                .is_some_and(|known| *known == value)
+                .then_some(value_index),
             CellLookup::Borders => {
                 let value_index = self.borders.partition_point(|&border| border <= value);
                 Some(value_index.clamp(1, self.values.len()) - 1)
@@ -285,15 +286,18 @@ mod tests {
     #[test]
     fn each_value_lies_in_its_block() {
         let values: Vec<f64> = (0..10).map(f64::from).collect();
-        let blocks = GridAxis::with_blocks(&test_axis(&values, false), 4);
-        assert_eq!(blocks.values, [1.5, 5.5, 8.5]);
-        assert_eq!(blocks.borders, [-0.5, 3.5, 7.5, 9.5]);
-        assert_eq!(blocks.spans, Some(vec![[0.0, 3.0], [4.0, 7.0], [8.0, 9.0]]));
-        let cells: Vec<Option<usize>> =
-            values.iter().map(|value| blocks.cell_index(*value)).collect();
-        let expected = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2].map(Some);
-        assert_eq!(cells, expected);
-        assert_eq!([0, 1, 2].map(|cell| blocks.value_count(cell)), [Some(4), Some(4), Some(2)]);
+        let axis_of_blocks = GridAxis::with_blocks(&test_axis(&values, false), 4);
+        assert_eq!(axis_of_blocks.values, [1.5, 5.5, 8.5]);
+        assert_eq!(axis_of_blocks.borders, [-0.5, 3.5, 7.5, 9.5]);
+        assert_eq!(axis_of_blocks.spans, Some(vec![[0.0, 3.0], [4.0, 7.0], [8.0, 9.0]]));
+        let found_cells: Vec<Option<usize>> =
+            values.iter().map(|value| axis_of_blocks.cell_index(*value)).collect();
+        let expected_cells = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2].map(Some);
+        assert_eq!(found_cells, expected_cells);
+        assert_eq!(
+            [0, 1, 2].map(|cell| axis_of_blocks.value_count(cell)),
+            [Some(4), Some(4), Some(2)]
+        );
     }
 
     #[test]

@@ -65,8 +65,8 @@ const CELL_BYTES: usize = 7_000_000;
 
 /// Returns the columns of a map file that a page carries: all results but the counts of steps.
 pub(crate) fn page_columns(source: &FigureFile, axes: &[SweptAxis]) -> Vec<String> {
-    let names = source.columns.iter().map(|column| column.name.as_str());
-    names
+    let column_names = source.columns.iter().map(|column| column.name.as_str());
+    column_names
         .filter(|name| !name.starts_with("steps_") && !name.starts_with("rejected_"))
         .filter(|name| axes.iter().all(|axis| axis.name != *name))
         .map(str::to_owned)
@@ -147,9 +147,9 @@ fn provenance(source: &FigureFile) -> String {
         let mut lines: Vec<String> = text.lines().map(escape).collect();
         if text.len() > MAX_ENTRY_CHARACTERS {
             let first_characters: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
-            let length = text.len();
+            let text_length = text.len();
             lines = vec![format!(
-                "{} ... ({length} characters in all; the file has them)",
+                "{} ... ({text_length} characters in all; the file has them)",
                 escape(&first_characters)
             )];
         }
@@ -158,8 +158,10 @@ fn provenance(source: &FigureFile) -> String {
     if source.provenance.is_empty() {
         return "The file says nothing about its origin.\n".to_owned();
     }
-    let list: String = source.provenance.iter().map(table_entry).collect();
-    format!("<details><summary>digests, versions, the plan</summary><dl>\n{list}</dl></details>\n")
+    let entry_list: String = source.provenance.iter().map(table_entry).collect();
+    format!(
+        "<details><summary>digests, versions, the plan</summary><dl>\n{entry_list}</dl></details>\n"
+    )
 }
 
 /// Maximum length of a metadata entry that a page carries whole, characters. Basis: a plan with
@@ -206,9 +208,9 @@ pub(crate) fn chart_page(
 
 /// Adds the picture that a page shows where scripts are switched off.
 pub(crate) fn add_still_picture(page: &[u8], picture: &[u8]) -> Vec<u8> {
-    let encoded = embed::encode_bytes(picture.iter().copied());
+    let encoded_picture = embed::encode_bytes(picture.iter().copied());
     // The placeholder precedes the data, which might hold the same text.
-    String::from_utf8_lossy(page).replacen("{{still}}", &encoded, 1).into_bytes()
+    String::from_utf8_lossy(page).replacen("{{still}}", &encoded_picture, 1).into_bytes()
 }
 
 /// Writes a page of this HTML body without scripts, to be read and printed.
@@ -225,9 +227,9 @@ pub fn html_table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
         return String::new();
     }
     fn table_row<T: AsRef<str>>(cells: &[T], element: &str) -> String {
-        let cells =
+        let cells_html =
             cells.iter().map(|text| format!("<{element}>{}</{element}>", escape(text.as_ref())));
-        format!("<tr>{}</tr>\n", cells.collect::<String>())
+        format!("<tr>{}</tr>\n", cells_html.collect::<String>())
     }
     let table_rows: String = rows.iter().map(|cells| table_row(cells, "td")).collect();
     let heading =
@@ -241,8 +243,8 @@ pub fn html_table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
 /// Returns an SVG picture as an HTML image, so that names within it do not clash with those of the
 /// page.
 pub(crate) fn svg_image(svg: &[u8]) -> String {
-    let encoded = embed::encode_bytes(svg.iter().copied());
-    format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{encoded}\">")
+    let encoded_svg = embed::encode_bytes(svg.iter().copied());
+    format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{encoded_svg}\">")
 }
 
 /// Writes a page of these data with a `summary` of the run, in HTML. Scripts of a live page come
@@ -335,9 +337,9 @@ fn columns_json(table: &FigureTable) -> Value {
 /// cell.
 fn codes_json(table: &FigureTable) -> Value {
     let encode_words = |column: &FigureColumn| {
-        let words = column.words()?;
-        let codes = embed::encode_bytes(words.codes.iter().copied());
-        let data = json!({ "data": codes, "words": words.names });
+        let word_codes = column.words()?;
+        let codes = embed::encode_bytes(word_codes.codes.iter().copied());
+        let data = json!({ "data": codes, "words": word_codes.names });
         Some((column.facts.name.clone(), data))
     };
     table.columns.iter().filter_map(encode_words).collect()
@@ -390,8 +392,8 @@ fn layer_json(map: &CellMap, column: &ShownColumn, layer: Layer, max_points: usi
     let colours = (0..COLOUR_STEPS).map(|step| layer.scale.colour(step).css());
     let ticks = layer.scale.ticks().into_iter().map(tick_json);
     let mut data = json!({
-        "group": column.group.name(),
-        "groupWords": column.group.in_words(),
+        "group": column.column_group.name(),
+        "groupWords": column.column_group.in_words(),
         "channel": column.channel,
         "words": column.short_name(),
         "worse": column.worse().map(Worse::name),

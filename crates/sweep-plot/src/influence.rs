@@ -23,8 +23,8 @@ pub(crate) struct RankInfluence {
 impl RankInfluence {
     /// Returns the influence of `x` on `y` over pairs that have both values.
     pub(crate) fn new(x: &[f64], y: &[f64]) -> Option<Self> {
-        let pairs = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
-        let (x, y): (Vec<f64>, Vec<f64>) = pairs.unzip();
+        let finite_pairs = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let (x, y): (Vec<f64>, Vec<f64>) = finite_pairs.unzip();
         let x_ranks = compute_ranks(&x);
         let y_ranks = compute_ranks(&y);
         Some(Self {

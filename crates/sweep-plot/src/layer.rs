@@ -14,7 +14,7 @@ use super::read::{ColumnFacts, FigureFile, FigureKind};
 pub(crate) struct ShownColumn {
     facts: ColumnFacts,
     /// The group of columns that it belongs to.
-    pub(crate) group: ColumnGroup,
+    pub(crate) column_group: ColumnGroup,
     /// The channel, if the column is one of a channel.
     pub(crate) channel: Option<String>,
 }
@@ -119,11 +119,11 @@ pub(crate) struct QuantityColumns<'a> {
 pub(crate) fn collect_quantities(source: &FigureFile) -> Vec<QuantityColumns<'_>> {
     let mut quantities: Vec<QuantityColumns<'_>> = Vec::new();
     for column in
-        all_columns(source).into_iter().filter(|column| column.group != ColumnGroup::Ratio)
+        all_columns(source).into_iter().filter(|column| column.column_group != ColumnGroup::Ratio)
     {
         let Some(facts) = source.column(column.name()) else { continue };
         let (words, model) = match &column.channel {
-            Some(channel) => (label::channel_in_words(channel), column.group.name()),
+            Some(channel) => (label::channel_in_words(channel), column.column_group.name()),
             None => label::split_model(&facts.name),
         };
         match quantities.iter_mut().find(|quantity| quantity.words == words) {
@@ -206,7 +206,7 @@ pub(crate) fn all_columns(source: &FigureFile) -> Vec<ShownColumn> {
         let is_named = |column| shown_column.name() == column;
         (
             !is_named("ratio_change"),
-            shown_column.group as usize,
+            shown_column.column_group as usize,
             !is_named("ratio_max"),
             shown_column.channel.is_some(),
         )
@@ -234,7 +234,7 @@ impl ShownColumn {
                         .then(|| name_after_group.to_owned()),
                 )
             });
-        Self { facts: facts.clone(), group, channel }
+        Self { facts: facts.clone(), column_group: group, channel }
     }
 
     /// Returns the name of the column.
@@ -262,7 +262,7 @@ impl ShownColumn {
         let (column_extremes, sides) = &map.ranges_and_sides[self.name()];
         let column_extremes = column_extremes.values().map(|value| value * factor);
         let source = &map.table.source;
-        let is_ratio = self.group == ColumnGroup::Ratio;
+        let is_ratio = self.column_group == ColumnGroup::Ratio;
         // A linear model at rest gives an infinite ratio, which has no place on any scale.
         let or_nan_if_infinite = |value: f64| {
             if is_ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
@@ -286,7 +286,7 @@ impl ShownColumn {
         let (title, label) = self.title_and_label(source);
         let limit = self.dividing_limit(source);
         Ok(Layer {
-            is_nonlinear: self.group == ColumnGroup::Ratio
+            is_nonlinear: self.column_group == ColumnGroup::Ratio
                 || label::split_model(self.name()).1 != "linear",
             title,
             label: label::with_unit(&label, unit),
@@ -302,7 +302,7 @@ impl ShownColumn {
 
     /// Returns the column in words for a list to choose from, beside its group.
     pub(crate) fn short_name(&self) -> String {
-        match (self.group, &self.channel, label::split_model(self.name())) {
+        match (self.column_group, &self.channel, label::split_model(self.name())) {
             (_, Some(channel), _) => capitalise(&label::channel_in_words(channel)),
             (ColumnGroup::Ratio, None, _) => {
                 format!("{} ratio", capitalise(self.worse().unwrap_or(Worse::Greater).extreme()))
@@ -317,7 +317,7 @@ impl ShownColumn {
         let compared_quantity = source.compared_quantity();
         // The description of a column of differences says which file is divided by which.
         let description = self.facts.metadata.description.split(';').next().unwrap_or_default();
-        match (self.group, self.channel.as_deref().map(label::channel_in_words)) {
+        match (self.column_group, self.channel.as_deref().map(label::channel_in_words)) {
             (ColumnGroup::Ratio, None) if source.kind == FigureKind::DIFFERENCES => (
                 capitalise(description),
                 format!("largest ratio of {compared_quantity}, nonlinear / linear"),
@@ -359,7 +359,7 @@ impl ShownColumn {
         let worse = self.worse().unwrap_or(Worse::Greater);
         let (unit, factor) = label::display_unit(self.facts.unit());
         let value = limit * factor;
-        let is_log = self.group == ColumnGroup::Ratio;
+        let is_log = self.column_group == ColumnGroup::Ratio;
         let phrase = label::with_value("", value, unit);
         let quantity = if is_log { "ratio".to_owned() } else { label::split_model(self.name()).0 };
         let [above_meaning, below_meaning] =

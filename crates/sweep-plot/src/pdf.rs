@@ -230,11 +230,12 @@ impl Objects {
         let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
         // Writing to memory cannot fail.
         let _ = encoder.write_all(bytes);
-        let compressed = encoder.finish().unwrap_or_default();
-        let length = compressed.len();
+        let compressed_bytes = encoder.finish().unwrap_or_default();
+        let compressed_length = compressed_bytes.len();
         let mut object =
-            format!("<< /Filter /FlateDecode {entries}/Length {length} >>\nstream\n").into_bytes();
-        object.extend(compressed);
+            format!("<< /Filter /FlateDecode {entries}/Length {compressed_length} >>\nstream\n")
+                .into_bytes();
+        object.extend(compressed_bytes);
         object.extend(b"\nendstream");
         self.0.push(object);
         self.0.len()
@@ -301,9 +302,9 @@ impl Objects {
             bytes.extend(b"\nendobj\n");
         }
         let table_offset = bytes.len();
-        let count = self.0.len() + 1;
+        let object_count = self.0.len() + 1;
         let trailer = format!(
-            "xref\n0 {count}\n0000000000 65535 f \n{offset_table}trailer\n<< /Size {count} /Root \
+            "xref\n0 {object_count}\n0000000000 65535 f \n{offset_table}trailer\n<< /Size {object_count} /Root \
              {catalogue_object} 0 R /Info {information_object} 0 R \
              >>\nstartxref\n{table_offset}\n%%EOF\n"
         );
@@ -351,13 +352,15 @@ mod tests {
         };
         let mut contents = Vec::new();
         let mut offset = 0;
-        while let Some(start) = find_pattern(offset, b">>\nstream\n") {
-            let start = start + 10;
-            let end = find_pattern(start, b"\nendstream").unwrap();
+        while let Some(stream_start) = find_pattern(offset, b">>\nstream\n") {
+            let stream_start = stream_start + 10;
+            let stream_end = find_pattern(stream_start, b"\nendstream").unwrap();
             let mut unpacked_bytes = Vec::new();
-            ZlibDecoder::new(&document[start..end]).read_to_end(&mut unpacked_bytes).unwrap();
+            ZlibDecoder::new(&document[stream_start..stream_end])
+                .read_to_end(&mut unpacked_bytes)
+                .unwrap();
             contents.push(unpacked_bytes);
-            offset = end;
+            offset = stream_end;
         }
         contents
     }

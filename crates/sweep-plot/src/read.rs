@@ -124,13 +124,13 @@ impl FigureFile {
         let provenance: Vec<(String, Value)> = provenance.collect();
         let columns = files::columns(file.schema()).into_iter();
         let columns: Vec<ColumnFacts> = columns.map(complete_by_name).collect();
-        let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = model_kinds.all_kinds().find(|kind| kind.matches_columns(&names));
+        let column_names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+        let kind = model_kinds.all_kinds().find(|kind| kind.matches_columns(&column_names));
         let kind = kind.ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
             reason: format!(
                 "its columns ({}) are those of no file that has a figure: {}",
-                names.join(", "),
+                column_names.join(", "),
                 model_kinds.all_kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
             ),
         })?;
@@ -206,9 +206,9 @@ impl FigureFile {
 
     /// Returns the error for a file with more rows than a figure of its kind can show.
     pub fn too_many_rows_error(&self, rows: usize, max_rows: usize) -> PlotError {
-        let kind = self.kind.name;
+        let kind_name = self.kind.name;
         self.undrawable_error(format!(
-            "a {kind} file of {rows} rows is more than a figure can show, which is {max_rows} of \
+            "a {kind_name} file of {rows} rows is more than a figure can show, which is {max_rows} of \
              them"
         ))
     }
@@ -228,9 +228,11 @@ impl FigureFile {
         if !is_given || has_effect {
             return Ok(());
         }
-        let kind = self.kind.name;
+        let kind_name = self.kind.name;
         let path = self.path.display();
-        Err(PlotError::Unfit(format!("`{option}` is for {valid_files}; {path} is a {kind} file")))
+        Err(PlotError::Unfit(format!(
+            "`{option}` is for {valid_files}; {path} is a {kind_name} file"
+        )))
     }
 
     /// Rejects a file of another kind than an option takes.
@@ -248,8 +250,8 @@ impl FigureFile {
 
     /// Returns the error for a missing column that this kind of file needs.
     pub fn missing_column_error(&self, column: &str, expected: &str) -> PlotError {
-        let kind = self.kind.name;
-        self.undrawable_error(format!("a {kind} file needs the {expected} column `{column}`"))
+        let kind_name = self.kind.name;
+        self.undrawable_error(format!("a {kind_name} file needs the {expected} column `{column}`"))
     }
 
     /// Returns the first value of `key` in the metadata; outer levels are searched before inner

@@ -4,18 +4,18 @@
 /// both makes the search sixteen times slower.
 const SAMPLES_PER_SIDE: [usize; 2] = [44, 33];
 
-/// Returns the position farthest from the edges of a region for a text of `size` px; `None` if the
-/// text fits nowhere. The region has the points of a panel of `panel` px for which `is_inside` is
-/// true. Coordinates are px from the top left corner of the panel.
+/// Returns the position farthest from the edges of a region for a text of `name_size` px; `None` if
+/// the text fits nowhere. The region has the points of a panel of `panel` px for which `is_inside`
+/// is true. Coordinates are px from the top left corner of the panel.
 pub(crate) fn roomiest_position(
-    panel: [f64; 2],
-    size: [f64; 2],
+    panel_size: [f64; 2],
+    name_size: [f64; 2],
     is_inside: impl Fn([f64; 2]) -> bool,
 ) -> Option<[f64; 2]> {
     let sample_point = |i: usize, j: usize| {
         [
-            (i as f64 + 0.5) / SAMPLES_PER_SIDE[0] as f64 * panel[0],
-            (j as f64 + 0.5) / SAMPLES_PER_SIDE[1] as f64 * panel[1],
+            (i as f64 + 0.5) / SAMPLES_PER_SIDE[0] as f64 * panel_size[0],
+            (j as f64 + 0.5) / SAMPLES_PER_SIDE[1] as f64 * panel_size[1],
         ]
     };
     let sample_points = (0..SAMPLES_PER_SIDE[0])
@@ -23,12 +23,13 @@ pub(crate) fn roomiest_position(
     let (inside, outside): (Vec<_>, Vec<_>) = sample_points.partition(|&point| is_inside(point));
     // The distance is in units of the text's half extent, so that a wide text gets a wide place.
     let distance = |a: [f64; 2], b: [f64; 2]| {
-        let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / size[k]);
+        let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / name_size[k]);
         dx.max(dy)
     };
     let mut best_position: Option<(f64, [f64; 2])> = None;
     for centre in inside {
-        let edge_distances = [0, 1].map(|k| 2.0 * centre[k].min(panel[k] - centre[k]) / size[k]);
+        let edge_distances =
+            [0, 1].map(|k| 2.0 * centre[k].min(panel_size[k] - centre[k]) / name_size[k]);
         let mut clearance = edge_distances[0].min(edge_distances[1]);
         for &outside_point in &outside {
             clearance = clearance.min(distance(centre, outside_point));

@@ -249,7 +249,7 @@ impl MapSample<'_> {
         let is_known = |ratios: &f64| ratios.is_finite();
         let channel = |ratios: &f64| is_known(ratios).then_some("body_yaw");
         let reliable = |ratios: &f64| is_known(ratios).then_some(*ratios < self.limit);
-        let status = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
+        let status_name = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
         let fail_time = |yaw: &Option<_>| if yaw.is_some() { f64::NAN } else { 41.5 };
         let plan = serde_json::json!({
             "machine": { "name": "paper" }, "name": "sample",
@@ -288,7 +288,7 @@ impl MapSample<'_> {
                 amplitudes_of_model(1).into_iter().map(|yaw| 0.01 - 0.1 * yaw),
             )
             .with_worse("less", Some(0.0))
-            .words("status", amplitudes.iter().map(status))
+            .words("status", amplitudes.iter().map(status_name))
             .numbers("fail_time_s", "s", amplitudes.iter().map(fail_time))
             .counts("steps_nonlinear", points.iter().map(|_| 250_000))
             .with_metadata("sweep.plan", &plan.to_string())
@@ -345,9 +345,9 @@ pub(crate) fn has_figure<E: Display>(
     max_bytes: usize,
     draw: impl FnOnce() -> Result<Vec<u8>, E>,
 ) -> bool {
-    let start = Instant::now();
+    let start_time = Instant::now();
     let result = draw();
-    let elapsed_time = start.elapsed();
+    let elapsed_time = start_time.elapsed();
     assert!(elapsed_time < MAX_TIME, "{name}: {elapsed_time:?}");
     match result {
         Ok(bytes) => assert!(bytes.len() < max_bytes, "{name}: {} bytes", bytes.len()),

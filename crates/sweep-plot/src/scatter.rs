@@ -114,7 +114,7 @@ impl Scatter {
         let (unit, factor) = label::display_unit(facts.map_or("", |facts| facts.unit()));
         let (title, quantity_label) = column.title_and_label(&source);
         let limit = column.dividing_limit(&source);
-        let is_ratio = column.group == ColumnGroup::Ratio;
+        let is_ratio = column.column_group == ColumnGroup::Ratio;
         let axes: Vec<&str> =
             swept::axis_columns(&source).iter().map(|column| column.name.as_str()).collect();
         let stride = (source.rows * (axes.len() + 3)).div_ceil(MAX_KEPT_VALUES).max(1) as u64;
@@ -125,8 +125,8 @@ impl Scatter {
         let mut quantity_values = Vec::new();
         let mut sides = Vec::new();
         let mut side_counts = [0; 4];
-        let names = [&axes[..], &[column.name(), "reliable", layer::STATUS_COLUMN]].concat();
-        source.each_row(&names, |row| {
+        let column_names = [&axes[..], &[column.name(), "reliable", layer::STATUS_COLUMN]].concat();
+        source.each_row(&column_names, |row| {
             let axis_count = axes.len();
             let value = row.number(axis_count) * factor;
             let side = classify_side(

@@ -44,8 +44,8 @@ mod tests {
     #[test]
     fn the_interval_is_wilsons() {
         let percent = |count, all| {
-            let share = ShareInterval::wilson(count, all).unwrap();
-            [share.fraction, share.low, share.high]
+            let interval = ShareInterval::wilson(count, all).unwrap();
+            [interval.fraction, interval.low, interval.high]
                 .map(|fraction| format!("{:.1}", 100.0 * fraction))
         };
         // Expected values by hand: 8 of 10, z = 1.96.

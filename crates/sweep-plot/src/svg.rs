@@ -28,15 +28,17 @@ pub(crate) fn write_svg(scene: &Scene) -> String {
             SceneItem::Fill { outline, colour, is_crisp } => {
                 let rendering_attribute =
                     if *is_crisp { r#" shape-rendering="crispEdges""# } else { "" };
-                let data = path_data(outline);
+                let segment_data = path_data(outline);
                 let fill_attributes = paint_attributes("fill", *colour);
-                let _ =
-                    writeln!(svg, r#"<path d="{data}"{fill_attributes}{rendering_attribute}/>"#);
+                let _ = writeln!(
+                    svg,
+                    r#"<path d="{segment_data}"{fill_attributes}{rendering_attribute}/>"#
+                );
             }
             SceneItem::Line { outline, stroke } => {
-                let data = path_data(outline);
+                let segment_data = path_data(outline);
                 let style = stroke_style(stroke);
-                let _ = writeln!(svg, r#"<path d="{data}" fill="none"{style}/>"#);
+                let _ = writeln!(svg, r#"<path d="{segment_data}" fill="none"{style}/>"#);
             }
             SceneItem::Text(text) => write_text(&mut svg, text),
             SceneItem::Clip(outline) => {
@@ -55,11 +57,12 @@ fn write_clips(svg: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
     let mut clip_ids = BTreeMap::new();
     for item in &scene.items {
         let SceneItem::Clip(outline) = item else { continue };
-        let data = path_data(outline);
-        if !clip_ids.contains_key(&data) {
+        let segment_data = path_data(outline);
+        if !clip_ids.contains_key(&segment_data) {
             let clip_id = clip_ids.len();
-            let _ = writeln!(svg, r#"<clipPath id="c{clip_id}"><path d="{data}"/></clipPath>"#);
-            clip_ids.insert(data, clip_id);
+            let _ =
+                writeln!(svg, r#"<clipPath id="c{clip_id}"><path d="{segment_data}"/></clipPath>"#);
+            clip_ids.insert(segment_data, clip_id);
         }
     }
     clip_ids
@@ -68,7 +71,7 @@ fn write_clips(svg: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
 fn write_text(svg: &mut String, text: &Text) {
     let x = format_pixels(text.position[0]);
     let y = format_pixels(text.position[1]);
-    let position = if text.is_rotated {
+    let position_attributes = if text.is_rotated {
         format!(r#"transform="translate({x} {y}) rotate(-90)""#)
     } else {
         format!(r#"x="{x}" y="{y}""#)
@@ -89,7 +92,7 @@ fn write_text(svg: &mut String, text: &Text) {
     let escaped_text = escape(&text.text);
     let text_attributes =
         format!(r#"font-size="{font_size}"{weight_attribute}{anchor_attribute}{fill}{halo}"#);
-    let _ = writeln!(svg, "<text {position} {text_attributes}>{escaped_text}</text>");
+    let _ = writeln!(svg, "<text {position_attributes} {text_attributes}>{escaped_text}</text>");
 }
 
 /// Greatest coordinate that is written, px; positions beyond are moved there. Basis: far outside of
@@ -221,11 +224,11 @@ mod tests {
     fn rounding_does_not_accumulate_along_a_path() {
         let points: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k) * 0.333_33, 1.0]).collect();
         let data = path_data(&Outline::line(&points));
-        let sum: f64 = data[data.find('h').unwrap() + 1..]
+        let step_sum: f64 = data[data.find('h').unwrap() + 1..]
             .split('h')
             .map(|step| step.parse::<f64>().unwrap())
             .sum();
-        assert!((sum - 999.0 * 0.333_33).abs() < 0.011, "{sum}");
+        assert!((step_sum - 999.0 * 0.333_33).abs() < 0.011, "{step_sum}");
     }
 
     #[test]

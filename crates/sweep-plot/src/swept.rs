@@ -142,11 +142,12 @@ pub fn read_axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {
     if axis_columns_found.is_empty() {
         return Err(source.nothing_to_draw_error("the map has no axis"));
     }
-    let names: Vec<&str> = axis_columns_found.iter().map(|column| column.name.as_str()).collect();
+    let column_names: Vec<&str> =
+        axis_columns_found.iter().map(|column| column.name.as_str()).collect();
     let mut collectors: Vec<AxisCollector> =
-        names.iter().map(|_| AxisCollector::default()).collect();
-    source.each_row(&names, |row| {
-        for (column, (name, collectors)) in names.iter().zip(&mut collectors).enumerate() {
+        column_names.iter().map(|_| AxisCollector::default()).collect();
+    source.each_row(&column_names, |row| {
+        for (column, (name, collectors)) in column_names.iter().zip(&mut collectors).enumerate() {
             let value = row.number(column);
             if !value.is_finite() {
                 return Err(not_a_grid_error(format!("axis `{name}` has a row without a value")));

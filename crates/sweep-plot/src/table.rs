@@ -177,10 +177,10 @@ impl FigureTable {
         let buckets = Buckets::new(source.rows, count);
         let column_names: Vec<&str> =
             source.number_columns().map(|column| column.name.as_str()).collect();
-        let rule =
+        let kept_values =
             |name: &str| if name == "time_s" { KeptValues::Instants } else { KeptValues::Extremes };
         let mut decimators: Vec<Decimator> =
-            column_names.iter().map(|name| Decimator::new(buckets, rule(name))).collect();
+            column_names.iter().map(|name| Decimator::new(buckets, kept_values(name))).collect();
         source.each_row(&column_names, |row| {
             let decimators = decimators.iter_mut().enumerate();
             decimators.for_each(|(column, decimator)| decimator.push(row.number(column)));

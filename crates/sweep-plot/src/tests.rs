@@ -36,8 +36,11 @@ pub(super) fn draw_page_data(sample: SampleFile, options: &PlotOptions) -> Value
 /// Returns the data that a page carries.
 pub(super) fn page_data(page: &[u8]) -> Value {
     let page = std::str::from_utf8(page).unwrap();
-    let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
-    serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
+    let data_start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
+    serde_json::from_str(
+        &page[data_start..data_start + page[data_start..].find("</script>").unwrap()],
+    )
+    .unwrap()
 }
 
 /// Decodes a curve of a page.
@@ -97,15 +100,15 @@ fn columns_have_units_words_and_provenance() {
         "nonlinear_body_yaw, described"
     );
     assert_eq!(column("ratio_max").facts.unit(), "", "1 is no unit to show");
-    let words = |name: &str| column(name).words().unwrap();
+    let find_words = |name: &str| column(name).words().unwrap();
     let rows_without_verdict =
-        (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();
+        (0..table.rows).filter(|&row| find_words("reliable").get(row).is_none()).count();
     assert_eq!(
-        (words("reliable").names.join(" "), rows_without_verdict),
+        (find_words("reliable").names.join(" "), rows_without_verdict),
         ("false true".to_owned(), 2)
     );
     let diverged_rows =
-        (0..table.rows).filter(|&row| words("status").get(row) == Some("diverged")).count();
+        (0..table.rows).filter(|&row| find_words("status").get(row) == Some("diverged")).count();
     assert_eq!(diverged_rows, 1);
     assert_eq!(
         (table.source.ratio_limit(), table.source.run_name.as_deref()),
@@ -148,16 +151,16 @@ fn a_map_labels_axes_sides_boundary_and_failures() {
 #[test]
 fn the_boundary_of_a_map_follows_the_limit() {
     let data = draw_page_data(map_sample(), &PlotOptions::default());
-    let line = &data["layers"][0]["lines"][0];
-    let points: Vec<f64> = line
+    let limit_line = &data["layers"][0]["lines"][0];
+    let coordinates: Vec<f64> = limit_line
         .as_array()
         .unwrap()
         .iter()
         .flat_map(|line| line.as_array().unwrap())
         .map(|value| value.as_f64().unwrap())
         .collect();
-    assert!(points.len() > 20);
-    for point in points.chunks(2) {
+    assert!(coordinates.len() > 20);
+    for point in coordinates.chunks(2) {
         // The logarithm of the sample's ratio is linear in both axes, so that interpolation is
         // exact.
         assert!((point[1] - (50.0 + 200.0 * point[0])).abs() < 0.01, "{point:?}");
@@ -340,8 +343,8 @@ fn a_figure_as_pdf_has_the_pages_size_and_its_title() {
     let text = String::from_utf8_lossy(&document);
     let figure = draw_svg(map_sample(), &PlotOptions::default());
     let width = figure.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
-    let points = 0.75 * width.parse::<f64>().unwrap();
-    assert!(text.contains(&format!("/MediaBox [0 0 {points} ")), "{width}");
+    let width_points = 0.75 * width.parse::<f64>().unwrap();
+    assert!(text.contains(&format!("/MediaBox [0 0 {width_points} ")), "{width}");
     assert!(text.contains("/Title <FEFF"));
 }
 

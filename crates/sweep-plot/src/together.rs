@@ -29,8 +29,8 @@ pub type NamedPoint = Vec<(String, f64)>;
 
 /// Returns the point that a trace belongs to, by its metadata.
 pub fn point_of_trace(source: &FigureFile) -> NamedPoint {
-    let values = source.find_metadata("at").and_then(Value::as_object).into_iter().flatten();
-    values.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
+    let point_values = source.find_metadata("at").and_then(Value::as_object).into_iter().flatten();
+    point_values.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
 /// Returns the differences of the plans of two files, each at a point: path and both values.
@@ -100,9 +100,9 @@ fn collect_differences<'a>(
                 value => value.to_string(),
             });
             // The elements of a list, such as springs, give one difference together.
-            let names = path.iter().copied().filter(|step| matches!(step, Step::Name(_)));
+            let key_names = path.iter().copied().filter(|step| matches!(step, Step::Name(_)));
             let phrase =
-                format!("{} {first} and {second}", dotted_path(&names.collect::<Vec<_>>()));
+                format!("{} {first} and {second}", dotted_path(&key_names.collect::<Vec<_>>()));
             if !differences.contains(&phrase) {
                 differences.push(phrase);
             }
@@ -126,11 +126,11 @@ fn is_set_by(parameter: &str, path: &[Step<'_>]) -> bool {
         return false;
     };
     let last_key = last_key.to_string();
-    let singular = first_key.strip_suffix('s').unwrap_or(first_key);
+    let singular_key = first_key.strip_suffix('s').unwrap_or(first_key);
     let index = inner_path.get(1).filter(|index| matches!(index, Step::Index(_)));
     parameter == last_key
-        || parameter == format!("{singular}_{last_key}")
-        || index.is_some_and(|index| parameter == format!("{singular}_{index}_{last_key}"))
+        || parameter == format!("{singular_key}_{last_key}")
+        || index.is_some_and(|index| parameter == format!("{singular_key}_{index}_{last_key}"))
 }
 
 /// Whether a value is that of a parameter of the point, although its path has another name.

@@ -218,7 +218,7 @@ pub(crate) fn read_modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, Plo
         columns.next().and_then(|column| column.numbers())
     };
     let band = find_turn_extreme("min").zip(find_turn_extreme("max"));
-    let names =
+    let mode_names =
         table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
     // A row without a number belongs to no mode.
@@ -232,7 +232,7 @@ pub(crate) fn read_modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, Plo
         rows.sort_by(|&a, &b| speeds_rpm[a].total_cmp(&speeds_rpm[b]));
         let select_rows =
             |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-        let mode_name_in_file = names.and_then(|names| names.get(*rows.first()?));
+        let mode_name_in_file = mode_names.and_then(|mode_names| mode_names.get(*rows.first()?));
         let resonances_in_file = || -> Option<Vec<f64>> {
             let mut modes_in_file = table.source.metadata_list(key::MODES);
             let resonances_rpm =
@@ -257,8 +257,9 @@ pub(crate) fn read_modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, Plo
 
 /// Returns the speeds at which a mode's frequency, linear between the given speeds, is the speed.
 fn resonance_speeds(speeds_rpm: &[f64], frequencies_rpm: &[f64]) -> Vec<f64> {
-    let pairs = frequencies_rpm.iter().zip(speeds_rpm);
-    let excesses_rpm: Vec<f64> = pairs.map(|(frequency, speed)| frequency - speed).collect();
+    let frequencies_and_speeds = frequencies_rpm.iter().zip(speeds_rpm);
+    let excesses_rpm: Vec<f64> =
+        frequencies_and_speeds.map(|(frequency, speed)| frequency - speed).collect();
     (1..excesses_rpm.len())
         .filter(|&k| excesses_rpm[k - 1] > 0.0 && excesses_rpm[k] <= 0.0)
         .map(|k| {

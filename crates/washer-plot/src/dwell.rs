@@ -95,8 +95,8 @@ pub(crate) fn dwell_chart(
             let (x, y): (Vec<f64>, Vec<f64>) = turns_in_range.unzip();
             Series::new("a run that passes these speeds", INK, x, y, SeriesStyle::Solid(1.4))
         }));
-        let values = series.iter().flat_map(|series| &series.y).copied();
-        let is_log = extremes(values.filter(|y| *y > 0.0))
+        let drawn_values = series.iter().flat_map(|series| &series.y).copied();
+        let is_log = extremes(drawn_values.filter(|y| *y > 0.0))
             .is_some_and(|(low, high)| high > MIN_LOG_RATIO * low);
         ChartPanel { height: 190.0, is_log, ..channel_panel((name, facts), is_shown[k], series) }
     });
@@ -116,7 +116,7 @@ fn draw_passing_run(
     let trace = trace::read_other_trace(path)?;
     let files = [
         (&trace.source, &together::point_of_trace(&trace.source)),
-        (source, &held_points.values()),
+        (source, &held_points.axis_values()),
     ];
     together::check_agreement("--against", path, files, MACHINE_SECTIONS)?;
     passages::passage_chart(&trace, &WasherFigures::default())
@@ -170,10 +170,12 @@ pub(crate) fn section_chart(
     let mut attractors: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
     held_points.each_row(&columns, |_, row| {
         let [motion, yaw, pitch] = [0, 1, 2].map(|k| row.values[k]);
-        let state = [1e3 * yaw, 1e3 * pitch];
+        let angles_mrad = [1e3 * yaw, 1e3 * pitch];
         match attractors.last_mut().filter(|last| (last.0, last.1) == (row.speed_rpm, motion)) {
-            Some((.., states)) => states.push(state),
-            None => attractors.push((row.speed_rpm, motion, kind_index(row.kind), vec![state])),
+            Some((.., states)) => states.push(angles_mrad),
+            None => {
+                attractors.push((row.speed_rpm, motion, kind_index(row.kind), vec![angles_mrad]))
+            }
         }
     })?;
     let mut panels: Vec<ChartPanel> = Vec::new();

@@ -74,7 +74,7 @@ pub(crate) fn passage_chart(
 /// Returns a curve over time as one over speed for each ramp.
 fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
     let is_dashed = series.name.starts_with("linear") || series.name == "model";
-    let curve = |turns: &RampTurns| {
+    let ramp_series = |turns: &RampTurns| {
         let name = format!(
             "{}, speed {}",
             series.name,
@@ -94,7 +94,7 @@ fn series_over_speed(series: &Series, all_turns: &[RampTurns]) -> Vec<Series> {
             style,
         )
     };
-    all_turns.iter().map(curve).collect()
+    all_turns.iter().map(ramp_series).collect()
 }
 
 /// Returns the greatest magnitude; NaN if a value is missing.

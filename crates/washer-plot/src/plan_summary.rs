@@ -5,15 +5,15 @@ use sweep_plot::label::{format_significant, unit_of_name};
 
 /// Returns the summary as headings and texts.
 pub(crate) fn plan_summary(plan: &Value) -> Vec<(&'static str, String)> {
-    let lines =
+    let summary_lines =
         [("Machine", machine_summary(&plan["machine"])), ("Spin", spin_summary(&plan["spin"]))];
-    lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
+    summary_lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
 }
 
 /// Returns the number under a key, with the unit that ends the key.
 fn format_quantity(table: &Value, key: &str) -> Option<String> {
-    let value = format_significant(table.get(key)?.as_f64()?, 4);
-    Some(format!("{value} {}", unit_of_name(key)).trim_end().to_owned())
+    let value_text = format_significant(table.get(key)?.as_f64()?, 4);
+    Some(format!("{value_text} {}", unit_of_name(key)).trim_end().to_owned())
 }
 
 fn machine_summary(machine: &Value) -> Option<String> {
@@ -30,7 +30,7 @@ fn machine_summary(machine: &Value) -> Option<String> {
     // greatest.
     let list_summary = |(list, numbers): (&str, &[(&str, &str)])| {
         let elements_of_list = machine.get(list).and_then(Value::as_array)?;
-        let values = numbers.iter().filter_map(|(word, key)| {
+        let value_texts = numbers.iter().filter_map(|(word, key)| {
             // A number that an element lacks is 0; a number that all lack is left out.
             let number_of_element = |element: &Value| element[*key].as_f64().unwrap_or_default();
             let greatest_element = elements_of_list
@@ -44,9 +44,17 @@ fn machine_summary(machine: &Value) -> Option<String> {
             };
             Some(format!(" {word} {least_text}{}", format_quantity(greatest_element, key)?))
         });
-        let words = list.replace('_', " ");
-        let words = if elements_of_list.len() == 1 { words.trim_end_matches('s') } else { &words };
-        Some(format!("{} {words}{}", elements_of_list.len(), values.collect::<Vec<_>>().join(",")))
+        let element_name = list.replace('_', " ");
+        let element_name = if elements_of_list.len() == 1 {
+            element_name.trim_end_matches('s')
+        } else {
+            &element_name
+        };
+        Some(format!(
+            "{} {element_name}{}",
+            elements_of_list.len(),
+            value_texts.collect::<Vec<_>>().join(",")
+        ))
     };
     let lists: [(&str, &[(&str, &str)]); 6] = [
         ("springs", &[("of", "stiffness_n_per_m")]),

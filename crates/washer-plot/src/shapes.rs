@@ -45,8 +45,8 @@ pub(crate) fn shape_chart(table: &FigureTable) -> Result<Chart, PlotError> {
                 continue;
             };
             let panel_number = panels.len() + 1;
-            let words = format!("{}, {speed:.1} rpm", label::capitalise(name));
-            let label = Label::new(&words, "");
+            let label_words = format!("{}, {speed:.1} rpm", label::capitalise(name));
+            let label = Label::new(&label_words, "");
             panels.push(ChartPanel {
                 y_range: Some((-1.15, 1.15)),
                 height: 200.0,
@@ -167,8 +167,8 @@ fn max_separation(positions: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) ->
         let fraction = (x - positions.tub_x_m[0]) / (positions.tub_x_m[1] - positions.tub_x_m[0]);
         [0, 1].map(|k| tub[0][k] + fraction * (tub[1][k] - tub[0][k]))
     };
-    let points = positions.drum_x_m.into_iter().zip(drum);
-    let separations = points.map(|(x, deflection)| {
+    let deflected_points = positions.drum_x_m.into_iter().zip(drum);
+    let separations = deflected_points.map(|(x, deflection)| {
         (deflection[0] - tub_deflection(x)[0]).hypot(deflection[1] - tub_deflection(x)[1])
     });
     separations.fold(0.0, f64::max)

@@ -48,9 +48,9 @@ pub(crate) fn growth_chart(
     fixed_values: &NamedPoint,
 ) -> Result<Chart, PlotError> {
     let mut held_points = HeldPoints::matching(source, fixed_values, "--at")?;
-    let count = held_points.points.len();
-    if count > MAX_CURVES {
-        let curve_indices = (0..MAX_CURVES).map(|k| k * (count - 1) / (MAX_CURVES - 1));
+    let point_count = held_points.points.len();
+    if point_count > MAX_CURVES {
+        let curve_indices = (0..MAX_CURVES).map(|k| k * (point_count - 1) / (MAX_CURVES - 1));
         held_points.points = curve_indices.map(|index| held_points.points[index].clone()).collect();
     }
     let curves = held_points.read(&[])?;
@@ -72,8 +72,8 @@ pub(crate) fn growth_chart(
         axes.iter().zip(&shown_points[0]).enumerate().filter(|(k, _)| !is_varying_axis(*k));
     let mut notes =
         source.notes(constant_axes.map(|(_, (axis, value))| format_in_lower_case(axis, *value)));
-    if shown_points.len() < count {
-        notes.push(format!("{} of {count} points", shown_points.len()));
+    if shown_points.len() < point_count {
+        notes.push(format!("{} of {point_count} points", shown_points.len()));
     }
     let label = Label::new("Growth of a small disturbance", "1/s");
     let levels = vec![(0.0, "unstable above".to_owned())];
@@ -176,8 +176,8 @@ pub(crate) fn channel_panel(
     is_shown: bool,
     series: Vec<Series>,
 ) -> ChartPanel {
-    let words = label::capitalise(&label::channel_in_words(name));
-    let label = Label::new(&words, label::display_unit(facts.unit()).0);
+    let label_words = label::capitalise(&label::channel_in_words(name));
+    let label = Label::new(&label_words, label::display_unit(facts.unit()).0);
     ChartPanel { is_shown, ..ChartPanel::new(name, label, series) }
 }
 
@@ -250,17 +250,19 @@ fn stability_parts(
 pub(crate) fn shown_channels(
     source: &FigureFile,
     names: &[&str],
-    requested: &[String],
+    requested_channels: &[String],
 ) -> Result<Vec<bool>, PlotError> {
-    if let Some(unknown) = requested.iter().find(|name| !names.contains(&name.as_str())) {
+    if let Some(unknown) = requested_channels.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(source.unknown_name_error("--channel", unknown, "channel", names.join(", ")));
     }
     let default_channels: Vec<&str> =
         DEFAULT_CHANNELS.into_iter().filter(|name| names.contains(name)).collect();
-    let is_shown = |name: &&str| match (requested, &default_channels[..]) {
+    let is_shown = |name: &&str| match (requested_channels, &default_channels[..]) {
         ([], []) => true,
         ([], default_channels) => default_channels.contains(name),
-        (requested, _) => requested.iter().any(|name_requested| name_requested == name),
+        (requested_channels, _) => {
+            requested_channels.iter().any(|name_requested| name_requested == name)
+        }
     };
     Ok(names.iter().map(is_shown).collect())
 }
@@ -292,7 +294,7 @@ pub(crate) fn read_unstable(table: &FigureTable, path: &Path) -> Result<Unstable
     let axes = swept::axis_columns(&source);
     point.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
     let held_points = HeldPoints::single(&source, &point, "--stability")?;
-    let files = [(&table.source, &point_of_file), (&source, &held_points.values())];
+    let files = [(&table.source, &point_of_file), (&source, &held_points.axis_values())];
     together::check_agreement("--stability", path, files, MACHINE_SECTIONS)?;
     let curves = held_points.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
     let frequency =
@@ -348,10 +350,11 @@ impl<'a> HeldPoints<'a> {
         let mut held_points =
             Self { source, axes: swept::axis_columns(source), points: Vec::new() };
         let axis_index = |name: &str| {
-            let names = || held_points.axes.iter().map(|axis| axis.name.as_str());
-            let axis_index = names().position(|axis| axis == name);
-            axis_index
-                .ok_or_else(|| source.unknown_name_error(option, name, "axis", list_names(names())))
+            let axis_names = || held_points.axes.iter().map(|axis| axis.name.as_str());
+            let axis_index = axis_names().position(|axis| axis == name);
+            axis_index.ok_or_else(|| {
+                source.unknown_name_error(option, name, "axis", list_names(axis_names()))
+            })
         };
         let requested_values_by_axis =
             requested_values.iter().map(|(name, value)| Ok((axis_index(name)?, *value)));
@@ -407,23 +410,23 @@ impl<'a> HeldPoints<'a> {
                 _ => format!("the file to be drawn does not say which by {free_axes}"),
             };
             let path = source.path.display();
-            let count = held_points.points.len();
-            let phrase = format!("{path}: this file has {count} points, and {hint}");
+            let point_count = held_points.points.len();
+            let phrase = format!("{path}: this file has {point_count} points, and {hint}");
             return Err(PlotError::Unfit(phrase));
         }
         Ok(held_points)
     }
 
     /// Returns the axes with their values at the first point.
-    pub(crate) fn values(&self) -> NamedPoint {
-        let values = self.axes.iter().zip(&self.points[0]);
-        values.map(|(axis, value)| (axis.name.clone(), *value)).collect()
+    pub(crate) fn axis_values(&self) -> NamedPoint {
+        let axis_values = self.axes.iter().zip(&self.points[0]);
+        axis_values.map(|(axis, value)| (axis.name.clone(), *value)).collect()
     }
 
     /// Returns the notes on the run and on the first point.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let values = self.axes.iter().zip(&self.points[0]);
-        self.source.notes(values.map(|(axis, value)| format_in_lower_case(axis, *value)))
+        let axis_values = self.axes.iter().zip(&self.points[0]);
+        self.source.notes(axis_values.map(|(axis, value)| format_in_lower_case(axis, *value)))
     }
 
     /// Calls `visit` for each row of the points, with the index of its point.
@@ -447,17 +450,17 @@ impl<'a> HeldPoints<'a> {
         columns: &[S],
         mut visit: impl FnMut(SpeedRow<'_>),
     ) -> Result<(), PlotError> {
-        let names = self.axes.iter().map(|axis| axis.name.as_str());
-        let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
-        let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
+        let column_names = self.axes.iter().map(|axis| axis.name.as_str());
+        let column_names = column_names.chain(["speed_rpm", "growth_per_s", "kind"]);
+        let column_names: Vec<&str> = column_names.chain(columns.iter().map(S::as_ref)).collect();
         let axis_count = self.axes.len();
-        self.source.each_row(&names, |row| {
+        self.source.each_row(&column_names, |row| {
             visit(SpeedRow {
                 point: row.numbers(0..axis_count),
                 speed_rpm: row.number(axis_count),
                 growth_per_s: row.number(axis_count + 1),
                 kind: row.word(axis_count + 2),
-                values: row.numbers(axis_count + 3..names.len()),
+                values: row.numbers(axis_count + 3..column_names.len()),
             });
             Ok(())
         })
@@ -498,9 +501,10 @@ pub(crate) fn unstable_ranges(speeds_rpm: &[f64], growths_per_s: &[f64]) -> Vec<
 /// Returns the speeds at which growth passes 0. The end of a range at a missing response is no
 /// edge.
 fn stability_edges(speeds_rpm: &[f64], growths_per_s: &[f64]) -> Vec<f64> {
-    let pairs = speeds_rpm.iter().zip(growths_per_s);
-    let is_growing =
-        |edge: f64| pairs.clone().any(|(&speed, &growth)| speed == edge && growth > 0.0);
+    let speeds_and_growths = speeds_rpm.iter().zip(growths_per_s);
+    let is_growing = |edge: f64| {
+        speeds_and_growths.clone().any(|(&speed, &growth)| speed == edge && growth > 0.0)
+    };
     unstable_ranges(speeds_rpm, growths_per_s)
         .into_iter()
         .flatten()
@@ -555,21 +559,21 @@ mod tests {
 
     #[test]
     fn edges_are_where_growth_passes_zero() {
-        let speed = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-        let growth = [-1.0, 1.0, 2.0, -2.0, f64::NAN, 1.0, 1.0];
-        assert_eq!(unstable_ranges(&speed, &growth), [[1.5, 3.5], [6.0, 7.0]]);
-        assert_eq!(stability_edges(&speed, &growth), [1.5, 3.5]);
-        assert!(unstable_ranges(&speed[..1], &growth[..1]).is_empty());
+        let speeds_rpm = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        let growths_per_s = [-1.0, 1.0, 2.0, -2.0, f64::NAN, 1.0, 1.0];
+        assert_eq!(unstable_ranges(&speeds_rpm, &growths_per_s), [[1.5, 3.5], [6.0, 7.0]]);
+        assert_eq!(stability_edges(&speeds_rpm, &growths_per_s), [1.5, 3.5]);
+        assert!(unstable_ranges(&speeds_rpm[..1], &growths_per_s[..1]).is_empty());
     }
 
     #[test]
     fn a_curve_is_dashed_from_edge_to_edge_of_its_unstable_range() {
-        let speed = [200.0, 210.0, 220.0, 230.0, 240.0];
-        let growth = [-1.0, 1.0, -3.0, f64::NAN, 1.0];
-        let curve = [1.0, 3.0, 7.0, 9.0, 11.0];
-        let [stable, unstable] = stability_parts(&speed, &curve, &growth);
-        let finite_part = |(speed, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
-            speed.into_iter().zip(values).filter(|(_, value)| !value.is_nan()).collect()
+        let speeds_rpm = [200.0, 210.0, 220.0, 230.0, 240.0];
+        let growths_per_s = [-1.0, 1.0, -3.0, f64::NAN, 1.0];
+        let curve_values = [1.0, 3.0, 7.0, 9.0, 11.0];
+        let [stable, unstable] = stability_parts(&speeds_rpm, &curve_values, &growths_per_s);
+        let finite_part = |(speeds, values): (Vec<f64>, Vec<f64>)| -> Vec<(f64, f64)> {
+            speeds.into_iter().zip(values).filter(|(_, value)| !value.is_nan()).collect()
         };
         assert_eq!(finite_part(stable), [(200.0, 1.0), (205.0, 2.0), (212.5, 4.0), (220.0, 7.0)]);
         assert_eq!(
@@ -577,15 +581,17 @@ mod tests {
             [(205.0, 2.0), (210.0, 3.0), (212.5, 4.0), (240.0, 11.0)]
         );
         // A last speed alone in its part is the end of a line, no dot.
-        let [_, unstable] = stability_parts(&speed[..2], &curve[..2], &growth[..2]);
+        let [_, unstable] =
+            stability_parts(&speeds_rpm[..2], &curve_values[..2], &growths_per_s[..2]);
         assert_eq!(finite_part(unstable), [(205.0, 2.0), (210.0, 3.0)]);
     }
 
     #[test]
     fn a_ramp_is_within_a_band_on_the_way_up_and_down() {
-        let time: Vec<f64> = (0..=10).map(f64::from).collect();
-        let speed: Vec<f64> = time.iter().map(|t| 100.0 * (5.0 - (t - 5.0_f64).abs())).collect();
-        let intervals = intervals_within(&time, &speed, &[[150.0, 250.0], [500.0, 600.0]]);
+        let times_s: Vec<f64> = (0..=10).map(f64::from).collect();
+        let speeds_rpm: Vec<f64> =
+            times_s.iter().map(|t| 100.0 * (5.0 - (t - 5.0_f64).abs())).collect();
+        let intervals = intervals_within(&times_s, &speeds_rpm, &[[150.0, 250.0], [500.0, 600.0]]);
         assert_eq!(intervals, [[1.5, 2.5], [7.5, 8.5]]);
         // The first curve passes the whole band in one step, the second stays in it.
         assert_eq!(intervals_within(&[0.0, 1.0], &[0.0, 100.0], &[[20.0, 30.0]]), [[0.2, 0.3]]);

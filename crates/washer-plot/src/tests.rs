@@ -55,8 +55,11 @@ fn draw_page_data(sample: SampleFile, options: &impl DrawOptions) -> Value {
 /// Returns the data that a page carries.
 fn page_data(page: &[u8]) -> Value {
     let page = std::str::from_utf8(page).unwrap();
-    let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
-    serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
+    let data_start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
+    serde_json::from_str(
+        &page[data_start..data_start + page[data_start..].find("</script>").unwrap()],
+    )
+    .unwrap()
 }
 
 /// Decodes a curve of a page.
@@ -76,13 +79,13 @@ fn default_options() -> PlotOptions {
 
 /// Returns a trace of twelve seconds of both models, to 300 rpm and back.
 pub(crate) fn trace() -> SampleFile {
-    let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
+    let times_s: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
     let oscillation = |factor: f64| {
-        time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
+        times_s.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
     };
     SampleFile::default()
-        .numbers("time_s", "s", time.iter().copied())
-        .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
+        .numbers("time_s", "s", times_s.iter().copied())
+        .numbers("speed_rpm", "rpm", times_s.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
         .numbers("nonlinear_tub_yaw", "rad", oscillation(0.07))
         .numbers("nonlinear_drum_front_y", "m", oscillation(0.03))
         .numbers("linear_tub_yaw", "rad", oscillation(0.009))
@@ -168,12 +171,16 @@ fn a_trace_is_compared_with_another() {
         trace(),
         &options_against(other_trace.write(folder.path(), "other.parquet")),
     );
-    let yaw = &data["chart"]["panels"][0]["series"];
-    let name_and_grid =
-        |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
+    let yaw_series = &data["chart"]["panels"][0]["series"];
+    let name_and_grid = |k: usize| {
+        (
+            yaw_series[k]["name"].as_str().unwrap().to_owned(),
+            yaw_series[k]["grid"].as_u64().unwrap(),
+        )
+    };
     assert_eq!(name_and_grid(0), ("input".to_owned(), 0), "by its file where it has no name");
     assert_eq!(
-        (name_and_grid(1), yaw.as_array().unwrap().len()),
+        (name_and_grid(1), yaw_series.as_array().unwrap().len()),
         (("another program".to_owned(), 1), 2)
     );
     assert!(
@@ -273,10 +280,10 @@ fn passages_are_drawn_for_rising_and_falling_speed() {
     let data = draw_page_data(trace(), &options);
     let chart = &data["chart"];
     let panels = chart["panels"].as_array().unwrap();
-    let yaw = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
+    let yaw_panel = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
     // The sample's amplitude grows with time and it oscillates faster than it turns, so that on the
     // way down the deviation is greatest at rest.
-    let [up, down] = [0, 1].map(|series| decode_curve(&yaw["series"][series]["y"]));
+    let [up, down] = [0, 1].map(|series| decode_curve(&yaw_panel["series"][series]["y"]));
     assert!(up.is_sorted() && down.is_sorted_by(|a, b| a >= b) && up.len() > 10, "{up:?} {down:?}");
     let trace_at_constant_speed = SampleFile::default()
         .numbers("time_s", "s", [0.0, 1.0, 2.0])
@@ -303,9 +310,9 @@ fn a_live_page_contains_the_module_and_its_setup() {
     let options = WasherFigures { live: Some(live), ..WasherFigures::default() };
     let page = draw(map_sample(), &options, "a.html").unwrap();
     let live = &page_data(&page)["live"];
-    let compressed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    let compressed_module = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
     let mut module = Vec::new();
-    flate2::read::GzDecoder::new(&compressed[..]).read_to_end(&mut module).unwrap();
+    flate2::read::GzDecoder::new(&compressed_module[..]).read_to_end(&mut module).unwrap();
     assert_eq!(module[..8], *b"\0asm\x01\0\0\0");
     let setup = STANDARD.decode(live["setup"].as_str().unwrap()).unwrap();
     assert_eq!(setup, [0.1, f64::INFINITY].map(f64::to_le_bytes).concat());
@@ -394,9 +401,9 @@ fn a_decimated_trace_keeps_its_peaks() {
     assert!(page.len() < 10_000_000, "{}", page.len());
     let data = page_data(&page);
     assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
-    let yaw = decode_curve(&data["chart"]["panels"][0]["series"][0]["y"]);
-    assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
-    assert_eq!(yaw.len(), decode_curve(&data["chart"]["grids"][0]).len());
+    let yaw_curve = decode_curve(&data["chart"]["panels"][0]["series"][0]["y"]);
+    assert_eq!(yaw_curve.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
+    assert_eq!(yaw_curve.len(), decode_curve(&data["chart"]["grids"][0]).len());
 }
 
 #[test]
@@ -448,11 +455,11 @@ fn the_same_file_gives_the_same_bytes() {
 
 #[test]
 fn columns_with_the_same_name_are_drawn() {
-    let time = || (0..50).map(f64::from);
+    let times_s = || (0..50).map(f64::from);
     let trace = SampleFile::default()
-        .numbers("time_s", "s", time())
-        .numbers("nonlinear_tub_yaw", "rad", time())
-        .numbers("nonlinear_tub_yaw", "rad", time())
-        .numbers("speed_rpm", "rpm", time());
+        .numbers("time_s", "s", times_s())
+        .numbers("nonlinear_tub_yaw", "rad", times_s())
+        .numbers("nonlinear_tub_yaw", "rad", times_s())
+        .numbers("speed_rpm", "rpm", times_s());
     assert!(draw(trace, &default_options(), "a.svg").is_ok());
 }

@@ -35,8 +35,8 @@ pub(crate) fn trace_chart(
     }
     let model_prefixes = model_prefixes(table);
     let quantities = trace_quantities(table, model_prefixes);
-    let names: Vec<&str> = quantities.iter().map(|quantity| quantity.name).collect();
-    let is_shown = stability::shown_channels(&table.source, &names, &options.channels)?;
+    let quantity_names: Vec<&str> = quantities.iter().map(|quantity| quantity.name).collect();
+    let is_shown = stability::shown_channels(&table.source, &quantity_names, &options.channels)?;
     // States and forces are drawn on request only.
     let is_any_requested = !options.channels.is_empty();
     let shown_names = quantities
@@ -68,10 +68,10 @@ pub(crate) fn trace_chart(
     let quantity_panel = |quantity: &TraceQuantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
         let is_channel = quantity.is_channel && model_prefixes == MODEL_PREFIXES;
-        let words =
+        let label_words =
             if is_channel { label::channel_in_words(name) } else { label::name_in_words(name) };
         let series = model_curves(&quantity.columns, factor);
-        trace_panel(name, Label::new(&words, unit), shown_names.contains(&name), series)
+        trace_panel(name, Label::new(&label_words, unit), shown_names.contains(&name), series)
     };
     let mut panels: Vec<ChartPanel> = quantities.iter().map(quantity_panel).collect();
     // Decimated rows of two files do not lie at the same instants.
@@ -83,9 +83,9 @@ pub(crate) fn trace_chart(
         let (unit, factor) = label::display_unit(column.facts.unit());
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
         let residual = Series::new("residual", INK, Rc::clone(&times_s), y, SeriesStyle::Dots);
-        let words = format!("residual, {}", label::name_in_words(name));
+        let label_words = format!("residual, {}", label::name_in_words(name));
         let is_shown = shown_names.contains(&name);
-        let label = Label::new(&words, unit);
+        let label = Label::new(&label_words, unit);
         panels.push(trace_panel(&format!("residual_{name}"), label, is_shown, vec![residual]));
     }
     let mut gap_series = model_curves(&["gap_nonlinear_m", "gap_linear_m"].map(str::to_owned), 1e3);
@@ -222,10 +222,10 @@ fn file_stem(table: &FigureTable) -> String {
 /// points differ, or else their files' names.
 fn distinct_names(first: &FigureTable, second: &FigureTable) -> [String; 2] {
     let tables = [first, second];
-    let names =
+    let run_names =
         tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| file_stem(table)));
-    if names[0] != names[1] {
-        return names;
+    if run_names[0] != run_names[1] {
+        return run_names;
     }
     let points = tables.map(|table| together::point_of_trace(&table.source));
     let differing_values = |index: usize| -> Vec<String> {
@@ -281,8 +281,10 @@ pub(crate) fn subtitle(
     let settings = table.source.find_metadata("set");
     let is_not_in_run_name =
         |(name, value): &(&str, f64)| settings.is_none_or(|settings| settings[*name] != *value);
-    let values = machine_values.iter().copied().chain(further_values).filter(is_not_in_run_name);
-    let mut parts = table.source.notes(values.map(|(name, value)| format_parameter(name, value)));
+    let subtitle_values =
+        machine_values.iter().copied().chain(further_values).filter(is_not_in_run_name);
+    let mut parts =
+        table.source.notes(subtitle_values.map(|(name, value)| format_parameter(name, value)));
     parts.extend(common_notes(least_gaps_mm, difference_of_runs));
     if let Some(rows) = table.bucket_rows {
         parts.push(format!("least and greatest of every {rows} instants"));
@@ -365,8 +367,11 @@ mod tests {
     #[test]
     fn a_resonance_is_passed_while_speed_rises_and_falls() {
         let times_s: Vec<f64> = (0..=8).map(f64::from).collect();
-        let speed: Vec<f64> = times_s.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
-        assert_eq!(passage_times(&times_s, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);
-        assert_eq!(passage_times(&times_s, &speed, &[200.0]), [(4.0, 200.0)]);
+        let speeds_rpm: Vec<f64> = times_s.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
+        assert_eq!(
+            passage_times(&times_s, &speeds_rpm, &[75.0, 500.0]),
+            [(1.5, 75.0), (6.5, 75.0)]
+        );
+        assert_eq!(passage_times(&times_s, &speeds_rpm, &[200.0]), [(4.0, 200.0)]);
     }
 }

@@ -32,10 +32,10 @@ struct BoundaryPoint {
 pub(crate) fn boundary_chart(table: &FigureTable) -> Result<Chart> {
     let columns: Vec<&FigureColumn> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
-    let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
+    let column_names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
     let too_few_points_error =
         || table.source.nothing_to_draw_error("a curve needs at least two points");
-    let (low, high) = bracket_columns(&names).ok_or_else(too_few_points_error)?;
+    let (low, high) = bracket_columns(&column_names).ok_or_else(too_few_points_error)?;
     let x_column = columns[0];
     let y_column = columns[1];
     let xs = table.numbers(&x_column.facts.name)?;
@@ -209,10 +209,10 @@ pub(crate) struct Overlay {
 /// # Errors
 /// [`PlotError::Unfit`] if it has other axes; otherwise as [`chart`].
 pub(crate) fn boundary_overlay(table: &FigureTable, axes: [&str; 2]) -> Result<Overlay> {
-    let names: Vec<&str> = table.source.planned_axes().collect();
-    if names != axes {
-        let [names, axes] = [&names[..], &axes].map(|names| names.join(", "));
-        let phrase = format!("is a boundary over {names}; the map is over {axes}");
+    let axis_names: Vec<&str> = table.source.planned_axes().collect();
+    if axis_names != axes {
+        let [own_axes, map_axes] = [&axis_names[..], &axes].map(|names| names.join(", "));
+        let phrase = format!("is a boundary over {own_axes}; the map is over {map_axes}");
         return Err(PlotError::Unfit(format!("{} {phrase}", table.source.path.display())));
     }
     let chart = boundary_chart(table)?;
@@ -244,12 +244,12 @@ fn limit_in_words(table: &FigureTable) -> String {
 
 /// Returns the values of the axes beyond the second, which the plan in the file names.
 fn describe_further_axes(table: &FigureTable, row: usize) -> String {
-    let values = table.source.planned_axes().skip(2).filter_map(|name| {
+    let further_values = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
         Some(label::with_value(&label::name_in_words(name), value, column.facts.unit()))
     });
-    values.collect::<Vec<_>>().join(", ")
+    further_values.collect::<Vec<_>>().join(", ")
 }
 
 /// Joins the points of a boundary to curves with at most one point for each x. If there are several
@@ -303,7 +303,7 @@ mod tests {
     fn a_fold_continues_the_nearest_curve() {
         let create_point =
             |x: f64, y: f64| BoundaryPoint { x, y, low: y - 0.1, high: y + 0.1, is_rising: None };
-        let points = [
+        let boundary_points = [
             create_point(1.0, 250.0),
             create_point(2.0, 238.0),
             create_point(2.0, 239.0),
@@ -311,7 +311,7 @@ mod tests {
             create_point(3.0, 243.0),
             create_point(3.0, 265.0),
         ];
-        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0, 3.0], &points)
+        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0, 3.0], &boundary_points)
             .iter()
             .map(|curve| curve.iter().map(|create_point| create_point.y).collect())
             .collect();
@@ -330,13 +330,13 @@ mod tests {
             high: y + 0.1,
             is_rising: Some(rising),
         };
-        let points = [
+        let boundary_points = [
             create_point(1.0, 238.5, false),
             create_point(1.0, 239.6, true),
             create_point(2.0, 240.0, false),
             create_point(2.0, 245.4, true),
         ];
-        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0], &points)
+        let curves: Vec<Vec<f64>> = join_curves(&[1.0, 2.0], &boundary_points)
             .iter()
             .map(|curve| curve.iter().map(|create_point| create_point.y).collect())
             .collect();

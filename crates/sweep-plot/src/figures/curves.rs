@@ -18,7 +18,7 @@ const MAX_MARKS: usize = 400;
 fn curves_title(source: &FigureFile, requested: &[ShownColumn]) -> String {
     let Some(first) = requested.first() else { return RATIOS_TITLE.to_owned() };
     let is_single_channel = requested.iter().all(|shown| shown.channel == first.channel);
-    match (first.group, first.channel.as_ref().filter(|_| is_single_channel)) {
+    match (first.column_group, first.channel.as_ref().filter(|_| is_single_channel)) {
         (ColumnGroup::Nonlinear | ColumnGroup::Linear, Some(channel)) => {
             format!("{AMPLITUDES_TITLE}: {}", label::channel_in_words(channel))
         }
@@ -54,12 +54,12 @@ pub(crate) fn curves_chart(map: &CellMap, options: &PlotOptions) -> Result<Chart
         (0..map.point_counts.len()).filter(|&cell| map.has_points(cell)).collect();
     let xs: Vec<f64> = filled_cells.iter().map(|&cell| axis.values[cell]).collect();
     let column_series = |name: &str, colour: Colour, column: &FigureColumn, factor: f64| {
-        let values = column.numbers().unwrap_or_default();
-        let y = filled_cells.iter().map(|&cell| values[cell] * factor).collect();
+        let column_values = column.numbers().unwrap_or_default();
+        let y = filled_cells.iter().map(|&cell| column_values[cell] * factor).collect();
         Series::new(name, colour, xs.clone(), y, SeriesStyle::Solid(2.2))
     };
     let requested_ratios: Vec<&ShownColumn> =
-        requested.iter().filter(|shown| shown.group == ColumnGroup::Ratio).collect();
+        requested.iter().filter(|shown| shown.column_group == ColumnGroup::Ratio).collect();
     let is_channel_requested = |name: &str| {
         let mut channels = requested_ratios.iter().map(|shown| shown.channel.as_deref());
         requested_ratios.is_empty()
@@ -143,7 +143,8 @@ fn ratio_panel(
             ..column_series("largest", INK, column, 1.0)
         });
     }
-    let words = format!("Ratio of {}, nonlinear / linear", map.table.source.compared_quantity());
+    let label_words =
+        format!("Ratio of {}, nonlinear / linear", map.table.source.compared_quantity());
     ChartPanel {
         is_shown,
         is_log: spans_decades(series.iter().flat_map(|series| series.y.iter().copied())),
@@ -152,7 +153,7 @@ fn ratio_panel(
             format!("unreliable from ratio {} on", label::format_significant(limit, 4)),
         )],
         mixed_ranges: mixed_ranges(map),
-        ..ChartPanel::new("ratio", Label::new(&words, ""), series)
+        ..ChartPanel::new("ratio", Label::new(&label_words, ""), series)
     }
 }
 

@@ -34,8 +34,8 @@ pub(crate) fn histogram_chart(scatter: &Scatter) -> Chart {
             [if is_in_range { percentage(bin) } else { f64::NAN }; 2]
         });
         let y: Vec<f64> = percentages_at_ends.collect();
-        let low = y.iter().map(|percentage| 0.0 * percentage).collect();
-        let style = SeriesStyle::Band(low, y.clone());
+        let base_percentages = y.iter().map(|percentage| 0.0 * percentage).collect();
+        let style = SeriesStyle::Band(base_percentages, y.clone());
         Some(Series::new(scatter.side_meaning(side), side_colour(side), bin_ends.clone(), y, style))
     });
     let series: Vec<Series> = series.collect();
@@ -65,14 +65,14 @@ pub(crate) fn histogram_chart(scatter: &Scatter) -> Chart {
 
 /// Returns the title with the share of points on the good side.
 fn histogram_title(scatter: &Scatter) -> String {
-    let words = match scatter.side_meaning(Side::Good) {
+    let side_words = match scatter.side_meaning(Side::Good) {
         // The words for the good side may be "reliable: below 2"; the title needs only the first.
         words if words.starts_with("reliable") => "reliable".to_owned(),
         words => format!("with {words}"),
     };
     match scatter.good_share() {
         Some(share) => {
-            format!("{}: {:.1} % of the points {words}", scatter.title, 100.0 * share.fraction)
+            format!("{}: {:.1} % of the points {side_words}", scatter.title, 100.0 * share.fraction)
         }
         None => scatter.title.clone(),
     }
@@ -99,10 +99,10 @@ fn histogram_notes(scatter: &Scatter) -> Vec<String> {
 /// axis.
 fn shown_limit(scatter: &Scatter) -> Option<&DividingLimit> {
     let limit = scatter.limit.as_ref()?;
-    let values =
+    let shown_values =
         scatter.quantity_values.iter().copied().filter(|value| !scatter.is_log || *value > 0.0);
     let to_coordinate = |value: f64| if scatter.is_log { value.ln() } else { value };
-    let (low, high) = extremes(values.map(to_coordinate))?;
+    let (low, high) = extremes(shown_values.map(to_coordinate))?;
     let value_span = high - low;
     let limit_coordinate = to_coordinate(limit.value);
     (low - value_span..=high + value_span).contains(&limit_coordinate).then_some(limit)
@@ -112,9 +112,9 @@ fn shown_limit(scatter: &Scatter) -> Option<&DividingLimit> {
 /// number of bins is twice the cube root of the number of points (Rice's rule).
 fn compute_bin_edges(scatter: &Scatter) -> Vec<f64> {
     let limit = shown_limit(scatter).map(|limit| limit.value);
-    let values = scatter.quantity_values.iter().copied().chain(limit);
-    let values = values.filter(|value| !scatter.is_log || *value > 0.0);
-    let (low, high) = extremes(values).unwrap_or((1.0, 2.0));
+    let shown_values = scatter.quantity_values.iter().copied().chain(limit);
+    let shown_values = shown_values.filter(|value| !scatter.is_log || *value > 0.0);
+    let (low, high) = extremes(shown_values).unwrap_or((1.0, 2.0));
     let scale = if scatter.is_log {
         AxisScale::logarithmic(low, high)
     } else {
@@ -122,14 +122,17 @@ fn compute_bin_edges(scatter: &Scatter) -> Vec<f64> {
     };
     let from_coordinate =
         |coordinate: f64| if scatter.is_log { coordinate.exp() } else { coordinate };
-    let low = scale.coordinate(low);
-    let high = scale.coordinate(high);
+    let low_coordinate = scale.coordinate(low);
+    let high_coordinate = scale.coordinate(high);
     let bin_count =
         (2.0 * (scatter.count_with_value() as f64).cbrt()).ceil().clamp(4.0, MAX_HISTOGRAM_BINS);
-    let bin_width =
-        if high > low { (high - low) / bin_count } else { low.abs().max(1.0) / bin_count };
-    let origin = limit.map_or(low, |limit| scale.coordinate(limit));
-    let first_edge_index = ((low - origin) / bin_width).floor() as i64;
+    let bin_width = if high_coordinate > low_coordinate {
+        (high_coordinate - low_coordinate) / bin_count
+    } else {
+        low_coordinate.abs().max(1.0) / bin_count
+    };
+    let origin = limit.map_or(low_coordinate, |limit| scale.coordinate(limit));
+    let first_edge_index = ((low_coordinate - origin) / bin_width).floor() as i64;
     // The last bin must reach the greatest value.
     let last_edge_index = (((high - origin) / bin_width).ceil() as i64).max(first_edge_index + 1);
     (first_edge_index..=last_edge_index)

@@ -122,9 +122,9 @@ pub(crate) fn draw_map_scene(
         let is_lowest = index + panel_columns >= cuts.cuts.len();
         panel.draw_frame(&mut scene, is_lowest, column == 0);
         if let Some(name) = &cut.name {
-            let position = [panel.x + width / 2.0, panel.y - 8.0];
+            let text_position = [panel.x + width / 2.0, panel.y - 8.0];
             scene.draw_text(
-                Text::new(name.clone(), position, TICK_SIZE)
+                Text::new(name.clone(), text_position, TICK_SIZE)
                     .with_bold_face()
                     .with_anchor(Anchor::Middle),
             );
@@ -408,8 +408,8 @@ impl<'a> CellPainter<'a> {
         let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.y_pixel(border)).collect();
         let mut strips = Vec::new();
         for (x, borders) in x_axis.borders.windows(2).enumerate() {
-            let left = panel.x_pixel(borders[0]);
-            let right = panel.x_pixel(borders[1]);
+            let left_x = panel.x_pixel(borders[0]);
+            let right_x = panel.x_pixel(borders[1]);
             let content_at = |y: usize| content(self.map.grid.cell(x, y, cut_indices));
             let mut start = 0;
             while start + 1 < ys.len() {
@@ -421,7 +421,10 @@ impl<'a> CellPainter<'a> {
                 {
                     end += 1;
                 }
-                strips.push(([left, ys[end], right - left, ys[start] - ys[end]], first_content));
+                strips.push((
+                    [left_x, ys[end], right_x - left_x, ys[start] - ys[end]],
+                    first_content,
+                ));
                 start = end;
             }
         }
@@ -461,9 +464,9 @@ impl<'a> CellPainter<'a> {
             limit_lines(self.map, layer_and_limit, 1, cell, max_points).into_iter().flatten();
         let mut outline = Outline::default();
         let lines = lines.map(|line| {
-            let points: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.pixel(x, y)).collect();
-            outline.add_line(&points);
-            points.into_iter().map(Some).collect()
+            let pixels: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.pixel(x, y)).collect();
+            outline.add_line(&pixels);
+            pixels.into_iter().map(Some).collect()
         });
         let lines = lines.collect();
         scene.draw_line(outline.clone(), Stroke::new_solid(PAPER, 5.0));
@@ -504,8 +507,8 @@ impl<'a> CellPainter<'a> {
             let name_position = roomiest_position(panel_size, name_size, is_clear)
                 .or_else(|| roomiest_position(panel_size, name_size, is_inside));
             if let Some([x, y]) = name_position {
-                let position = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
-                let text = Text::new(name, position, LABEL_SIZE)
+                let text_position = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
+                let text = Text::new(name, text_position, LABEL_SIZE)
                     .with_bold_face()
                     .with_anchor(Anchor::Middle);
                 scene.draw_text(Text { halo: Some(PAPER), ..text });
@@ -602,8 +605,8 @@ fn is_near_line(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]
         let fraction = ((px * dx + py * dy) / squared_length).clamp(0.0, 1.0);
         (px - fraction * dx).hypot(py - fraction * dy) < max_distance
     };
-    let pairs = lines.iter().flat_map(|line| line.windows(2));
-    let mut segments = pairs.filter_map(|pair| pair[0].zip(pair[1]));
+    let pixel_pairs = lines.iter().flat_map(|line| line.windows(2));
+    let mut segments = pixel_pairs.filter_map(|pair| pair[0].zip(pair[1]));
     segments.any(|(from, to)| is_near_segment(from, to))
 }
 

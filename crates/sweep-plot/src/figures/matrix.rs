@@ -143,8 +143,9 @@ pub(crate) fn draw_matrix(scatter: &Scatter) -> (Scene, PanelPositions) {
             scene.draw_clipped(panel.outline(), |scene| {
                 if let (true, Some(limit)) = (is_last_row, &scatter.limit) {
                     let limit_y = panel.y_pixel(limit.value);
-                    let line = Outline::line(&[[panel.x, limit_y], [panel.x + width, limit_y]]);
-                    scene.draw_line(line, level_stroke());
+                    let limit_line =
+                        Outline::line(&[[panel.x, limit_y], [panel.x + width, limit_y]]);
+                    scene.draw_line(limit_line, level_stroke());
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
@@ -292,8 +293,8 @@ fn legend_entries(scatter: &Scatter) -> Vec<(LegendSymbol, String)> {
     let mut entries = Vec::new();
     for (side, count) in Side::ALL.into_iter().zip(scatter.side_counts) {
         if count > 0 {
-            let words = format!("{} ({count})", scatter.side_meaning(side));
-            entries.push((side_symbol(side), words));
+            let entry_text = format!("{} ({count})", scatter.side_meaning(side));
+            entries.push((side_symbol(side), entry_text));
         }
     }
     let quantity_scale = scale_with_margin(&scatter.quantity_values, scatter.is_log);

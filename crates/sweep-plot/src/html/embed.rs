@@ -35,8 +35,9 @@ pub fn quantise(values: &[f64]) -> (String, f64) {
         round_to_six_digits(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
     let to_integer =
         |value: &f64| if value.is_finite() { (value / quantum).round() as i16 } else { i16::MIN };
-    let data = values.iter().flat_map(|value| to_integer(value).to_le_bytes()).collect::<Vec<u8>>();
-    (STANDARD.encode(data), quantum)
+    let integer_bytes =
+        values.iter().flat_map(|value| to_integer(value).to_le_bytes()).collect::<Vec<u8>>();
+    (STANDARD.encode(integer_bytes), quantum)
 }
 
 /// Rounds a number to six digits, so that it is written short.

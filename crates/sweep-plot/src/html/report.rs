@@ -22,8 +22,8 @@ pub(crate) fn run_summary(source: &FigureFile, model: &dyn Figures) -> String {
             common_lines.into_iter().filter_map(|(title, text)| Some((title, text?)));
         model.plan_summary(plan).into_iter().chain(common_lines).collect::<Vec<_>>()
     };
-    let lines = source.find_metadata(key::PLAN).map(plan_lines).into_iter().flatten();
-    let rows: Vec<_> = lines.map(|(title, text)| vec![title.to_owned(), text]).collect();
+    let summary_lines = source.find_metadata(key::PLAN).map(plan_lines).into_iter().flatten();
+    let rows: Vec<_> = summary_lines.map(|(title, text)| vec![title.to_owned(), text]).collect();
     html_table("What was run", &["", ""], &rows) + &model.tables()
 }
 
@@ -55,8 +55,8 @@ pub(crate) fn cautions(map: &CellMap, model: &dyn Figures) -> String {
     notes.extend(
         model.cautions().iter().chain([&ASSUMPTIONS_NOTE]).map(|&phrase| phrase.to_owned()),
     );
-    let items: String = notes.iter().map(|text| format!("<li>{text}</li>\n")).collect();
-    format!("<h2>What to be careful about</h2>\n<ul>\n{items}</ul>\n")
+    let item_list: String = notes.iter().map(|text| format!("<li>{text}</li>\n")).collect();
+    format!("<h2>What to be careful about</h2>\n<ul>\n{item_list}</ul>\n")
 }
 
 /// The note that holds for every map.

@@ -11,7 +11,7 @@ const MAX_BYTES: usize = 3 << 20;
 
 /// Returns a design without a result.
 fn failed_design() -> SampleFile {
-    designs::failed(24)
+    designs::failed_design(24)
 }
 
 #[test]
@@ -31,8 +31,8 @@ fn figures_of_a_failed_design_state_the_failure() {
     assert!(influence.contains(">no two points have values that differ<"), "{influence}");
     assert!(influence.contains("0 with a value"), "{influence}");
     let page = super::draw_page_data(failed_design(), &PlotOptions::default());
-    let range = page["histogram"]["chart"]["xRange"].as_array().unwrap();
-    assert!(range.iter().all(|end| end.as_f64().is_some_and(|end| end > 0.0)), "{range:?}");
+    let x_range = page["histogram"]["chart"]["xRange"].as_array().unwrap();
+    assert!(x_range.iter().all(|end| end.as_f64().is_some_and(|end| end > 0.0)), "{x_range:?}");
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn damaged_files_have_a_figure_or_an_error() {
     let mut figure_count = 0_u64;
     for round in 0..rounds {
         let limit = ["0", "-1", "1e-300", "inf", "NaN", "2"][random.usize(..6)];
-        let designs = [designs::failed(9), designs::points(2 + random.u32(..40))];
+        let designs = [designs::failed_design(9), designs::design(2 + random.u32(..40))];
         for sample in designs {
             let sample = sample.with_damage(&mut random).with_limit("ratio_max", limit);
             let name = format!("SEED={seed}, round {round}, design");

@@ -6,7 +6,7 @@ use super::{draw, draw_svg, error_message, options_for_column, page_data};
 
 /// Returns points whose ratio is 4 where the mass exceeds a half, for any damping; the last row
 /// failed and the one before it is undefined.
-pub(super) fn points(count: u32) -> SampleFile {
+pub(super) fn design(count: u32) -> SampleFile {
     points_with(count, |sample| sample)
 }
 
@@ -47,7 +47,7 @@ fn points_with(count: u32, add_parameters: impl Fn(SampleFile) -> SampleFile) ->
 }
 
 /// Returns random points, none of which has a result.
-pub(super) fn failed(count: u32) -> SampleFile {
+pub(super) fn failed_design(count: u32) -> SampleFile {
     let missing_values = || (0..count).map(|_| f64::NAN);
     let plan = r#"{
         "name": "sample", "reliability": { "ratio_limit": 2.0 },
@@ -80,7 +80,7 @@ fn count_texts(figure: &str, text: &str) -> usize {
 
 #[test]
 fn a_design_has_a_panel_for_each_pair_and_a_legend() {
-    let figure = draw_svg(points(202), &PlotOptions::default());
+    let figure = draw_svg(design(202), &PlotOptions::default());
     for phrase in [
         "Where the linear model can be trusted",
         "sample · 202 points at random",
@@ -95,8 +95,13 @@ fn a_design_has_a_panel_for_each_pair_and_a_legend() {
     assert_eq!(count_texts(&figure, "Unbalance mass (kg)"), 1);
     assert!(!figure.contains("Gravity"), "what is the same at every point is no axis");
     let count_on_side = |side: &str| {
-        let start = figure.find(side).unwrap() + side.len();
-        figure[start..start + 5].split(['(', ')']).nth(1).unwrap().parse::<u32>().unwrap()
+        let count_start = figure.find(side).unwrap() + side.len();
+        figure[count_start..count_start + 5]
+            .split(['(', ')'])
+            .nth(1)
+            .unwrap()
+            .parse::<u32>()
+            .unwrap()
     };
     assert_eq!(
         count_on_side(">reliable: below 2 ") + count_on_side(">unreliable: ratio 2 or more "),
@@ -106,30 +111,34 @@ fn a_design_has_a_panel_for_each_pair_and_a_legend() {
 
 /// Returns a design of five parameters with long names and numbers of five digits.
 fn long_numbers() -> SampleFile {
-    let spread = |from: f64, to: f64, step: f64| {
+    let spread_values = |from: f64, to: f64, step: f64| {
         (0..80).map(move |k| from + (to - from) * (f64::from(k) * step).fract())
     };
     points_with(80, |sample| {
         sample
-            .numbers("spring_stiffness_n_per_m", "N/m", spread(5000.0, 12000.0, 0.732))
-            .numbers("flexure_stiffness_n_m_per_rad", "N m/rad", spread(15000.0, 30000.0, 0.236))
-            .numbers("body_inertia_11_kg_m2", "kg m^2", spread(0.8, 1.6, 0.141))
+            .numbers("spring_stiffness_n_per_m", "N/m", spread_values(5000.0, 12000.0, 0.732))
+            .numbers(
+                "flexure_stiffness_n_m_per_rad",
+                "N m/rad",
+                spread_values(15000.0, 30000.0, 0.236),
+            )
+            .numbers("body_inertia_11_kg_m2", "kg m^2", spread_values(0.8, 1.6, 0.141))
     })
 }
 
 /// Returns the horizontal centred texts of a picture: position, size and text.
 fn centred_texts(figure: &str) -> Vec<([f64; 2], f64, String)> {
-    let number = |text: &str, name: &str| {
+    let read_attribute = |text: &str, name: &str| {
         let (_, rest) = text.split_once(&format!(" {name}=\""))?;
         rest.split('"').next()?.parse::<f64>().ok()
     };
     let texts = figure.split("<text").skip(1).filter_map(|text| {
         let (tag, rest) = text.split_once('>')?;
         let is_plain = tag.contains("middle") && !tag.contains("rotate");
-        let position = [number(tag, "x")?, number(tag, "y")?];
+        let position = [read_attribute(tag, "x")?, read_attribute(tag, "y")?];
         is_plain.then_some((
             position,
-            number(tag, "font-size")?,
+            read_attribute(tag, "font-size")?,
             rest.split('<').next()?.to_owned(),
         ))
     });
@@ -170,7 +179,7 @@ fn units_are_not_broken_across_lines() {
 
 #[test]
 fn a_histogram_states_the_share_and_its_interval() {
-    let figure = draw_svg(points(102), &options_for_view(DesignView::Histogram));
+    let figure = draw_svg(design(102), &options_for_view(DesignView::Histogram));
     // The values 0.618 k modulo 1 with k below 100 exceed a half 49 times. The interval (Wilson) is
     // calculated by hand.
     assert!(figure.contains("51.0 % of the points reliable"), "{figure}");
@@ -179,7 +188,7 @@ fn a_histogram_states_the_share_and_its_interval() {
     let draw_histogram = |column| {
         let options =
             PlotOptions { view: Some(DesignView::Histogram), ..options_for_column(column) };
-        draw_svg(points(102), &options)
+        draw_svg(design(102), &options)
     };
     let figure_of_gap = draw_histogram("min_gap_nonlinear_m");
     assert!(
@@ -192,27 +201,27 @@ fn a_histogram_states_the_share_and_its_interval() {
 #[test]
 fn bins_count_every_point_once() {
     let page =
-        page_data(&draw(points(102), &options_for_view(DesignView::Histogram), "a.html").unwrap());
+        page_data(&draw(design(102), &options_for_view(DesignView::Histogram), "a.html").unwrap());
     let series = page["histogram"]["chart"]["panels"][0]["series"].as_array().unwrap();
-    let shares = series.iter().map(|series| {
+    let percentage_lists = series.iter().map(|series| {
         // Each bin gives two points of the curve.
         let ends = super::decode_curve(series);
         ends.iter().filter(|share| share.is_finite()).sum::<f64>() / 2.0
     });
-    let shares: Vec<f64> = shares.collect();
+    let percentages: Vec<f64> = percentage_lists.collect();
     let is_near = |share: f64, expected: f64| (share - expected).abs() < 1e-3;
-    assert!(is_near(shares[0], 51.0) && is_near(shares[1], 49.0), "{shares:?}");
+    assert!(is_near(percentages[0], 51.0) && is_near(percentages[1], 49.0), "{percentages:?}");
 }
 
 #[test]
 fn the_most_influential_parameter_comes_first() {
     let page =
-        page_data(&draw(points(402), &options_for_view(DesignView::Influence), "a.html").unwrap());
+        page_data(&draw(design(402), &options_for_view(DesignView::Influence), "a.html").unwrap());
     assert_eq!(
         (page["kind"].as_str(), page["first"].as_str()),
         (Some("design"), Some("influence"))
     );
-    let figure = draw_svg(points(402), &options_for_view(DesignView::Influence));
+    let figure = draw_svg(design(402), &options_for_view(DesignView::Influence));
     assert_eq!(page["influence"], figure);
     // The number follows the parameter's name.
     let rank_correlation = |name: &str| -> f64 {
@@ -234,27 +243,27 @@ fn a_figure_of_influence_names_its_channel() {
         view: Some(DesignView::Influence),
         ..options_for_column("nonlinear_body_yaw")
     };
-    let figure = draw_svg(points(102), &options);
+    let figure = draw_svg(design(102), &options);
     let title = ">What it depends on: amplitude, nonlinear model: body yaw<";
     assert!(figure.contains(title), "{figure}");
 }
 
 #[test]
 fn many_points_are_all_counted_and_some_are_drawn() {
-    let page = page_data(&draw(points(250_002), &PlotOptions::default(), "a.html").unwrap());
+    let page = page_data(&draw(design(250_002), &PlotOptions::default(), "a.html").unwrap());
     let scatter = &page["scatter"];
     let picture = scatter["picture"].as_str().unwrap();
     let legend_texts = ["reliable: below 2 (", "ratio 2 or more (", "excitation (", "no result ("];
-    let count = |words: &str| -> u64 {
+    let count_in_legend = |words: &str| -> u64 {
         let (_, rest) = picture.split_once(words).unwrap();
         rest.split(')').next().unwrap().parse().unwrap()
     };
-    assert_eq!(legend_texts.map(count).iter().sum::<u64>(), 250_002);
+    assert_eq!(legend_texts.map(count_in_legend).iter().sum::<u64>(), 250_002);
     let drawn_count = scatter["of"].as_array().unwrap().len();
     assert!((3000..5000).contains(&drawn_count), "{drawn_count}");
     assert!(page["subtitle"].as_str().unwrap().contains("picked at random"));
-    let size = draw(points(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
-    assert!(size < 2_000_000, "{size}");
+    let svg_bytes = draw(design(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
+    assert!(svg_bytes < 2_000_000, "{svg_bytes}");
 }
 
 #[test]
@@ -266,11 +275,12 @@ fn a_list_of_a_whole_grid_is_drawn_as_a_map() {
     ));
     assert!(error.contains("`--view` is for designs"), "{error}");
     assert!(
-        error_message(draw(points(50), &options_for_column("status"), "a.svg"))
+        error_message(draw(design(50), &options_for_column("status"), "a.svg"))
             .contains("no number")
     );
-    let at = PlotOptions { fixed_values: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
-    assert!(error_message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
+    let options_at_1 =
+        PlotOptions { fixed_values: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
+    assert!(error_message(draw(design(50), &options_at_1, "a.svg")).contains("`--at` is for maps"));
     let listed_map = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
         super::super::sample::map_sample().with_metadata("sweep.listed", plan)

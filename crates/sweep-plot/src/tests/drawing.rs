@@ -63,11 +63,11 @@ fn a_legend_names_each_line_once() {
 
 /// Returns the position of a text in a figure.
 fn text_position(figure: &str, text: &str) -> [f64; 2] {
-    let end = figure.find(&format!(">{text}<")).unwrap();
-    let element = &figure[figure[..end].rfind("<text").unwrap()..end];
+    let text_start = figure.find(&format!(">{text}<")).unwrap();
+    let element = &figure[figure[..text_start].rfind("<text").unwrap()..text_start];
     ["x", "y"].map(|name| {
-        let start = element.find(&format!(r#" {name}=""#)).unwrap() + name.len() + 3;
-        element[start..].split('"').next().unwrap().parse().unwrap()
+        let value_start = element.find(&format!(r#" {name}=""#)).unwrap() + name.len() + 3;
+        element[value_start..].split('"').next().unwrap().parse().unwrap()
     })
 }
 
@@ -79,22 +79,22 @@ fn names_of_regions_avoid_the_curve_of_a_boundary_file() {
     let damping_at_name = 315.0 - (y - 5.6 - frame::HEADING_HEIGHT) / 440.0 * 270.0;
     let masses = (1..=10).map(|k| 0.1 * f64::from(k));
     let constant = |offset: f64| (0..10).map(move |_| damping_at_name + offset);
-    let line = SampleFile::default()
+    let boundary_line = SampleFile::default()
         .numbers("unbalance_mass_kg", "kg", masses)
         .numbers("damping_n_s_per_m", "N s/m", constant(0.0))
         .numbers("damping_low_n_s_per_m", "N s/m", constant(-0.1))
         .numbers("damping_high_n_s_per_m", "N s/m", constant(0.1))
         .with_metadata("sweep.plan", &format!(r#"{{"axis": [{PLANNED_AXES}]}}"#));
-    let [_, moved_y] = text_position(&draw_over_map(line), NAME);
+    let [_, moved_y] = text_position(&draw_over_map(boundary_line), NAME);
     assert!((moved_y - y).abs() > 16.0, "{moved_y} {y}");
 }
 
 #[test]
 fn names_of_regions_avoid_the_line_between_them() {
     let axes = [("unbalance_mass_kg", 6, 0.28), ("friction_n", 6, 6.0)];
-    let values = |step: f64| (0..6).map(move |k| step * f64::from(k)).collect::<Vec<f64>>();
+    let axis_values = |step: f64| (0..6).map(move |k| step * f64::from(k)).collect::<Vec<f64>>();
     let corner = MapSample {
-        axes: axes.iter().map(|&(name, _, step)| (name, values(step))).collect(),
+        axes: axes.iter().map(|&(name, _, step)| (name, axis_values(step))).collect(),
         limit: 2.0,
         // The ratio exceeds the limit right of a line from the lower middle to the right edge.
         yaw: &|point| Some([0.01 * (2.0 + 2.0 * (point[0] - 0.7) - point[1] / 8.0).max(0.1), 0.01]),

@@ -22,13 +22,13 @@ fn long_map(counts: [usize; 2]) -> MapSample<'static> {
             ("damping_n_s_per_m", integers_below(counts[1])),
         ],
         limit: 2.0,
-        yaw: &|point| Some([0.01 * ratio(point), 0.01]),
+        yaw: &|point| Some([0.01 * ratio_at(point), 0.01]),
         is_chaotic: &|_| false,
     }
 }
 
 /// Returns the ratio at a point of the map.
-fn ratio(point: &[f64]) -> f64 {
+fn ratio_at(point: &[f64]) -> f64 {
     // The ratios of some points differ much from those of their neighbours, as in chaotic motion.
     let outlier_factor = if (point[0] * 31.0 + point[1] * 17.0) % 101.0 == 0.0 { 3.0 } else { 1.0 };
     outlier_factor * 4.0 / (1.0 + 3.0 * ((point[1] * 7.0 + point[0]) % 1000.0) / 1000.0)
@@ -91,7 +91,7 @@ fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
     assert!(xs.len() < counts[0] && ys.len() < counts[1] && xs.len() * ys.len() > 20_000);
     let [count, reliable, unreliable] =
         ["points", "reliable", "unreliable"].map(|name| decode_floats(&data["counts"][name]));
-    let worst = decode_floats(&data["columns"]["ratio_max"]["data"]);
+    let worst_ratios = decode_floats(&data["columns"]["ratio_max"]["data"]);
     let index = decode_floats(&data["columns"]["point"]["data"]);
     let [gap, margin] = ["min_gap_nonlinear_m", "margin_n"]
         .map(|name| decode_floats(&data["columns"][name]["data"]));
@@ -102,20 +102,20 @@ fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
         for (j, y) in ys.iter().enumerate() {
             let cell = i * ys.len() + j;
             let points = values_in_span(x).flat_map(|x| values_in_span(y).map(move |y| [x, y]));
-            let ratios: Vec<f64> = points.map(|point| ratio(&point)).collect();
+            let ratios: Vec<f64> = points.map(|point| ratio_at(&point)).collect();
             let unreliable_count = ratios.iter().filter(|ratio| **ratio >= 2.0).count();
             let greatest = ratios.iter().copied().fold(0.0, f64::max);
             let counts_of_cell = [count[cell], reliable[cell], unreliable[cell]];
-            let expected = [ratios.len(), ratios.len() - unreliable_count, unreliable_count];
-            assert_eq!(counts_of_cell, expected.map(|count| count as f64));
-            assert!((worst[cell] - greatest).abs() < 1e-6 * greatest);
+            let expected_counts = [ratios.len(), ratios.len() - unreliable_count, unreliable_count];
+            assert_eq!(counts_of_cell, expected_counts.map(|count| count as f64));
+            assert!((worst_ratios[cell] - greatest).abs() < 1e-6 * greatest);
             let least_gap = 0.01 - 0.1 * 0.01 * greatest;
             assert!((gap[cell] - least_gap).abs() < 1e-8, "the least gap of the cell");
             assert!((margin[cell] - 1.0 + 0.01 * greatest).abs() < 1e-6, "and its least margin");
             let index = index[cell] as usize;
             let worst_point =
                 [index / counts[1], index % counts[1]].map(|index_on_axis| index_on_axis as f64);
-            assert_eq!(ratio(&worst_point), greatest, "the point named is the worst one");
+            assert_eq!(ratio_at(&worst_point), greatest, "the point named is the worst one");
             assert_eq!(is_divided[cell], unreliable_count > 0 && unreliable_count < ratios.len());
             divided_cells += usize::from(is_divided[cell]);
         }
@@ -168,8 +168,11 @@ fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
     assert!(!figure.contains("both:") && !figure.contains("failed"));
     let data = page_data(&render_to(&input, "a.html"));
     let all_points = (0..500).flat_map(|x| (0..600).map(move |y| [f64::from(x), f64::from(y)]));
-    let sensitive = all_points.filter(|point| is_chaotic(point)).count();
-    assert_eq!(decode_floats(&data["counts"]["sensitive"]).iter().sum::<f64>(), sensitive as f64);
+    let sensitive_count = all_points.filter(|point| is_chaotic(point)).count();
+    assert_eq!(
+        decode_floats(&data["counts"]["sensitive"]).iter().sum::<f64>(),
+        sensitive_count as f64
+    );
     let [points, reliable] =
         ["points", "reliable"].map(|name| decode_floats(&data["counts"][name]));
     let undefined = decode_bits(&data["layers"][0]["undefined"]);
@@ -214,8 +217,8 @@ fn an_axis_of_too_many_values_is_drawn_by_its_range() {
 fn a_curve_marks_the_cells_that_hold_both_verdicts() {
     // The ratio falls through the limit of 2, and exceeds it once more at one point.
     let yaw = |point: &[f64]| {
-        let outlier = if point[0] == 200_000.0 { 0.01 } else { 0.0 };
-        Some([0.03 - 1e-7 * (point[0] - 2.5) + outlier, 0.01])
+        let outlier_amplitude = if point[0] == 200_000.0 { 0.01 } else { 0.0 };
+        Some([0.03 - 1e-7 * (point[0] - 2.5) + outlier_amplitude, 0.01])
     };
     let one_axis = MapSample {
         axes: vec![("damping_n_s_per_m", integers_below(240_000))],
@@ -243,10 +246,12 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
 
 #[test]
 fn a_page_of_too_many_cuts_keeps_the_requested_one() {
-    let values = || [40, 40, 60, 3].map(integers_below);
-    let names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
-    let sample =
-        || MapSample { axes: names.into_iter().zip(values()).collect(), ..long_map([1, 1]) };
+    let axis_values = || [40, 40, 60, 3].map(integers_below);
+    let axis_names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
+    let sample = || MapSample {
+        axes: axis_names.into_iter().zip(axis_values()).collect(),
+        ..long_map([1, 1])
+    };
     let folder = tempfile::tempdir().unwrap();
     let input = sample().write_long(folder.path(), "map.parquet");
     let page = render_to(&input, "a.html");
@@ -320,7 +325,7 @@ fn long_metadata_is_truncated_in_a_page() {
     let long_list = serde_json::to_string(&integers_below(100_000)).unwrap();
     let sample = long_map([3, 4]).sample().with_metadata("note", &long_list);
     let page = String::from_utf8(draw(sample, &PlotOptions::default(), "a.html").unwrap()).unwrap();
-    let start = page.find("<dt>note</dt>").unwrap();
-    let note = &page[start..start + page[start..].find("</dd>").unwrap()];
+    let note_start = page.find("<dt>note</dt>").unwrap();
+    let note = &page[note_start..note_start + page[note_start..].find("</dd>").unwrap()];
     assert!(note.len() < 20_000 && note.contains("characters in all; the file has them)"));
 }

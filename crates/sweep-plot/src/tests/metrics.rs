@@ -7,17 +7,17 @@ use super::{draw, draw_page_data, draw_svg, error_message, map_of_one_axis, opti
 
 /// Returns a map with columns whose bad direction is greater, and others whose is less.
 fn map_with_metrics() -> SampleFile {
-    let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
+    let rising_values = |from: f64| (0..90).map(move |k| from + f64::from(k));
     map_sample()
-        .numbers("cabinet_force_nonlinear_n", "N", rising(400.0))
+        .numbers("cabinet_force_nonlinear_n", "N", rising_values(400.0))
         .with_worse("greater", None)
-        .numbers("cabinet_force_linear_n", "N", rising(300.0))
+        .numbers("cabinet_force_linear_n", "N", rising_values(300.0))
         .with_worse("greater", None)
-        .numbers("stop_2_force_nonlinear_n", "N", rising(0.0))
+        .numbers("stop_2_force_nonlinear_n", "N", rising_values(0.0))
         .with_worse("greater", None)
-        .numbers("slip_margin_nonlinear_n", "N", rising(-45.0))
+        .numbers("slip_margin_nonlinear_n", "N", rising_values(-45.0))
         .with_worse("less", Some(0.0))
-        .numbers("static_sag_m", "m", rising(0.0).map(|k| 0.013 + 1e-5 * k))
+        .numbers("static_sag_m", "m", rising_values(0.0).map(|k| 0.013 + 1e-5 * k))
         .with_worse("greater", None)
 }
 
@@ -55,7 +55,7 @@ fn metrics_are_drawn_by_their_column_names() {
     let bad_directions = values_of_key(&data["layers"], "worse");
     assert_eq!(bad_directions[bad_directions.len() - 2..], ["less", "greater"]);
     let row_names = values_of_key(&data["rows"], "name");
-    let expected = [
+    let expected_names = [
         "least_gap",
         "margin",
         "fail_time",
@@ -64,7 +64,7 @@ fn metrics_are_drawn_by_their_column_names() {
         "slip_margin",
         "static_sag",
     ];
-    assert_eq!(row_names[2..], expected);
+    assert_eq!(row_names[2..], expected_names);
     for output in ["a.svg", "a.html"] {
         let phrase = error_message(draw(map_sample(), &options_for_column("static_sag_m"), output));
         assert!(
@@ -96,10 +96,11 @@ fn a_two_sided_verdict_names_the_ratio_of_each_side() {
 
 #[test]
 fn metrics_have_a_panel_in_maps_of_one_axis() {
-    let rising = (0..4).map(|k| 400.0 + f64::from(k));
+    let rising_values = (0..4).map(|k| 400.0 + f64::from(k));
     let with_force = || {
-        let sample = map_of_one_axis().numbers("stop_2_force_nonlinear_n", "N", rising.clone());
-        sample.numbers("stop_2_force_linear_n", "N", rising.clone())
+        let sample =
+            map_of_one_axis().numbers("stop_2_force_nonlinear_n", "N", rising_values.clone());
+        sample.numbers("stop_2_force_linear_n", "N", rising_values.clone())
     };
     let figure = draw_svg(with_force(), &options_for_column("stop_2_force_linear_n"));
     assert!(figure.contains(">Stop 2 force (N)<") && figure.contains(">linear model<"));

@@ -16,13 +16,14 @@ pub(super) fn stability(masses: &[f64]) -> SampleFile {
     let is_unstable = |row: &(f64, f64)| growth(row) > 0.0;
     let frequency_while_unstable =
         |value: f64| move |row: &(f64, f64)| if is_unstable(row) { value } else { f64::NAN };
-    let kind = |row: &(f64, f64)| Some(if is_unstable(row) { "quasi_periodic" } else { "stable" });
+    let kind_name =
+        |row: &(f64, f64)| Some(if is_unstable(row) { "quasi_periodic" } else { "stable" });
     SampleFile::default()
         .counts("point", rows.iter().map(|row| (row.0 * 10.0) as u64))
         .numbers("unbalance_mass_kg", "kg", rows.iter().map(|row| row.0))
         .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.1))
         .numbers("growth_per_s", "1/s", rows.iter().map(growth))
-        .words("kind", rows.iter().map(kind))
+        .words("kind", rows.iter().map(kind_name))
         .numbers("mode_1_cpm", "1/min", rows.iter().map(frequency_while_unstable(86.0)))
         .numbers("mode_2_cpm", "1/min", rows.iter().map(frequency_while_unstable(202.0)))
         .numbers("nonlinear_tub_yaw", "rad", rows.iter().map(|row| 0.002 * row.0))
@@ -79,12 +80,12 @@ fn each_point_has_a_curve_up_to_a_maximum() {
 fn unstable_responses_are_dashed() {
     let chart = draw_chart(stability(&[0.4]), &with_view(FigureView::Responses));
     let series = chart["panels"][0]["series"].as_array().unwrap().clone();
-    let names: Vec<(&str, bool)> = series
+    let names_and_styles: Vec<(&str, bool)> = series
         .iter()
         .map(|curve| (curve["name"].as_str().unwrap(), curve["dashed"].as_bool().unwrap()))
         .collect();
     assert_eq!(
-        names,
+        names_and_styles,
         [
             ("linear model", false),
             ("nonlinear model, stable", false),
@@ -108,15 +109,15 @@ fn other_figures_shade_unstable_speeds() {
     let chart = draw_chart(trace(), &options);
     let file = trace().write(folder.path(), "trace.parquet");
     let table = FigureTable::open(&file, MODEL_KINDS).unwrap();
-    let time = table.numbers("time_s").unwrap();
-    let speed = table.numbers("speed_rpm").unwrap();
+    let times_s = table.numbers("time_s").unwrap();
+    let speeds_rpm = table.numbers("speed_rpm").unwrap();
     let shaded_ranges = ranges(&chart["shades"]);
     assert!(!shaded_ranges.is_empty());
-    for (time, speed) in time.iter().zip(speed) {
-        let is_shaded = shaded_ranges.iter().any(|[from, to]| (from..=to).contains(&time));
-        let is_inside = (230.0..=250.0).contains(speed);
-        let is_at_an_edge = (speed - 230.0).abs() < 1e-6 || (speed - 250.0).abs() < 1e-6;
-        assert!(is_shaded == is_inside || is_at_an_edge, "{time} s, {speed} rpm");
+    for (time_s, speed_rpm) in times_s.iter().zip(speeds_rpm) {
+        let is_shaded = shaded_ranges.iter().any(|[from, to]| (from..=to).contains(&time_s));
+        let is_inside = (230.0..=250.0).contains(speed_rpm);
+        let is_at_an_edge = (speed_rpm - 230.0).abs() < 1e-6 || (speed_rpm - 250.0).abs() < 1e-6;
+        assert!(is_shaded == is_inside || is_at_an_edge, "{time_s} s, {speed_rpm} rpm");
     }
     let chart = draw_chart(modes(), &options);
     assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
@@ -126,8 +127,8 @@ fn other_figures_shade_unstable_speeds() {
         .iter()
         .map(|curve| curve["name"].as_str().unwrap().to_owned())
         .collect();
-    let sum = "sum of the frequencies of modes 1 and 2";
-    assert!(names.iter().any(|name| name == sum), "{names:?}");
+    let sum_name = "sum of the frequencies of modes 1 and 2";
+    assert!(names.iter().any(|name| name == sum_name), "{names:?}");
 }
 
 #[test]
