@@ -215,7 +215,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
             outcome.segment_end = segment_end;
             match segment_end {
                 SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } => {
-                    outcome.count.add(count);
+                    outcome.step_count.add(count);
                 }
                 SegmentEnd::Idle => {}
             }

@@ -74,7 +74,7 @@ fn greatest_difference(integrator: &str) -> f64 {
     let expected_rows = reference["rows"].as_array().unwrap();
     assert_eq!(rows.num_rows(), expected_rows.len());
     let mut difference = 0.0_f64;
-    for (row, expected) in expected.iter().enumerate() {
+    for (row, expected) in expected_rows.iter().enumerate() {
         for key in ["forcing", "forcing_rad_per_s"] {
             assert_eq!(read_number(&rows, key, row), expected[key].as_f64());
         }

@@ -304,8 +304,8 @@ impl Objects {
         let table_offset = bytes.len();
         let object_count = self.0.len() + 1;
         let trailer = format!(
-            "xref\n0 {object_count}\n0000000000 65535 f \n{offset_table}trailer\n<< /Size {object_count} /Root \
-             {catalogue_object} 0 R /Info {information_object} 0 R \
+            "xref\n0 {object_count}\n0000000000 65535 f \n{offset_table}trailer\n<< \
+             /Size {object_count} /Root {catalogue_object} 0 R /Info {information_object} 0 R \
              >>\nstartxref\n{table_offset}\n%%EOF\n"
         );
         bytes.extend(trailer.bytes());

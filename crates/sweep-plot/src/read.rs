@@ -208,8 +208,8 @@ impl FigureFile {
     pub fn too_many_rows_error(&self, rows: usize, max_rows: usize) -> PlotError {
         let kind_name = self.kind.name;
         self.undrawable_error(format!(
-            "a {kind_name} file of {rows} rows is more than a figure can show, which is {max_rows} of \
-             them"
+            "a {kind_name} file of {rows} rows is more than a figure can show, which is {max_rows} \
+             of them"
         ))
     }
 

@@ -494,7 +494,7 @@ impl Parser<'_> {
             }
             None => ExpressionNode::Unary(f64::abs, Box::new(inner_node.node)),
         };
-        Ok(TypedNode { node, kind: CellKind::Number, span: span.start..end })
+        Ok(TypedNode { node, kind: CellKind::Number, span: span.start..closing_end })
     }
 
     /// Parses the probability of a quantile.

@@ -121,7 +121,8 @@ fn without_curvatures_the_sampling_error_is_of_fourth_order() {
         [24, 48].map(|steps| largest_error_by(Peaks::advance_by_slopes, steps));
     let observed_order = (coarse_error / fine_error).log2();
     eprintln!(
-        "without curvatures, 48 steps a period: {fine_error:.2e} of the amplitude, order {observed_order:.2}"
+        "without curvatures, 48 steps a period: {fine_error:.2e} of the amplitude, order \
+         {observed_order:.2}"
     );
     assert!(observed_order > 3.5 && fine_error < 1e-5, "{observed_order} {fine_error:e}");
 }

@@ -225,7 +225,7 @@ pub(super) fn compare_maps(
         });
         crossings_by_line.insert(key, LineCrossings { key_values, crossings_by_file });
     }
-    Some(pair_crossings(first, &axis, other_keys, crossings_by_line))
+    Some(pair_crossings(first_table, &axis, other_keys, crossings_by_line))
 }
 
 /// Finds the crossing between two neighbours in one file, by a straight line through the logarithms

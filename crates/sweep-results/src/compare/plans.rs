@@ -71,8 +71,9 @@ pub(super) fn differs_in_nominal_values(
 ) -> bool {
     let Some((first_plan, second_plan)) = first_plan.zip(second_plan) else { return false };
     first_plan["axis"] != second_plan["axis"]
-        && first["design"] == second["design"]
-        && without_toleranced_numbers(&first["axis"]) == without_toleranced_numbers(&second["axis"])
+        && first_plan["design"] == second_plan["design"]
+        && without_toleranced_numbers(&first_plan["axis"])
+            == without_toleranced_numbers(&second_plan["axis"])
 }
 
 /// Returns the axes of a plan without the numbers that a tolerance and its nominal value determine.

@@ -98,7 +98,7 @@ impl ComparedFile {
         let row_count = row_groups.iter().map(|group| group.count).sum();
         Ok(Self {
             row_groups,
-            rows,
+            rows: row_count,
             key_count: keys.len(),
             matching_columns,
             first_column,

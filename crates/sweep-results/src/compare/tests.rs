@@ -178,7 +178,7 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
         let mut plan = sample::plan();
         plan["axis"].as_array_mut().unwrap().push(json!({ "parameter": "forcing_rad_per_s" }));
         let mut columns = sample::map_columns(&RATIOS);
-        let spin_values: Vec<_> = spin_values.iter().copied().map(Some).collect();
+        let spin_values: Vec<_> = values.iter().copied().map(Some).collect();
         columns.insert(3, ("forcing_rad_per_s", "rad/s", number_array(&spin_values)));
         write_table(columns, &[(key::PLAN, plan)])
     };
@@ -189,8 +189,8 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
     let error = compare(&map_table(&RATIOS), &table_with_two_spins).unwrap_err();
     assert!(matches!(error, ResultsError::Refused(_)));
     assert!(
-        message.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
-        "{message}"
+        error.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
+        "{error}"
     );
 }
 
@@ -266,8 +266,10 @@ fn a_shift_is_certain_only_beyond_the_brackets() {
     );
     assert_eq!(shift.unmatched_lines.len(), 1);
     assert_eq!(shift.unmatched_lines[0].1, [0, 1]);
-    let shift =
-        compare(&first, &boundary_table(&[None, None, None, None])).unwrap().boundary.unwrap();
+    let shift = compare(&first_table, &boundary_table(&[None, None, None, None]))
+        .unwrap()
+        .boundary
+        .unwrap();
     assert_eq!((shift.mean_shift_range(), shift.unmatched_lines.len()), (None, 3));
 }
 
