@@ -275,7 +275,7 @@ fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]
         spin: plan.model.spin.clone(),
         checkpoints: CHECKPOINTS,
         rule: rule(plan),
-        sliders: Sliders { parameters, axes: plan.axes.len() },
+        sliders: Sliders { parameters, axis_count: plan.axes.len() },
         levels,
         wide_levels,
     };

@@ -81,7 +81,7 @@ pub(crate) fn failure_reason(plan: &Plan, point: u64) -> Option<String> {
 /// its dampers, by their names.
 pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {
     let speeds = point.friction_speeds().iter();
-    speeds.map(|it| (format!("damper_{}", it.damper + 1), it.speed_m_per_s.into())).collect()
+    speeds.map(|it| (format!("damper_{}", it.damper_index + 1), it.speed_m_per_s.into())).collect()
 }
 
 /// Whether some damper has friction at some point of a plan.

@@ -252,7 +252,7 @@ pub unsafe extern "C" fn washer_outputs(
 mod tests {
     use super::*;
 
-    fn setup() -> WasherSetup {
+    fn example_setup() -> WasherSetup {
         WasherSetup {
             model: c"nonlinear".as_ptr(),
             profile: c"triangular".as_ptr(),
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    fn status(setup: &WasherSetup) -> WasherStatus {
+    fn new_status(setup: &WasherSetup) -> WasherStatus {
         let mut machine = ptr::null_mut();
         // SAFETY: everything that the setup points at outlives the call.
         let status = unsafe { washer_new(setup, &raw mut machine) };
@@ -279,15 +279,23 @@ mod tests {
 
     #[test]
     fn each_invalid_setup_has_its_own_status() {
-        assert_eq!(status(&setup()), WasherStatus::Ok);
-        assert_eq!(status(&WasherSetup { model: ptr::null(), ..setup() }), WasherStatus::Null);
+        assert_eq!(new_status(&example_setup()), WasherStatus::Ok);
         assert_eq!(
-            status(&WasherSetup { profile: c"spiral".as_ptr(), ..setup() }),
+            new_status(&WasherSetup { model: ptr::null(), ..example_setup() }),
+            WasherStatus::Null
+        );
+        assert_eq!(
+            new_status(&WasherSetup { profile: c"spiral".as_ptr(), ..example_setup() }),
             WasherStatus::UnknownName
         );
         let names = [c"unbalance_mass_kg".as_ptr()];
         let status_with = |names: &[*const c_char; 1], value: &f64| {
-            status(&WasherSetup { names: names.as_ptr(), values: value, constants: 1, ..setup() })
+            new_status(&WasherSetup {
+                names: names.as_ptr(),
+                values: value,
+                constants: 1,
+                ..example_setup()
+            })
         };
         assert_eq!(status_with(&names, &0.7), WasherStatus::Ok);
         assert_eq!(status_with(&names, &-0.7), WasherStatus::OutOfRange);
@@ -296,9 +304,12 @@ mod tests {
             status_with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3),
             WasherStatus::NoEquilibrium
         );
-        assert_eq!(status(&WasherSetup { constants: 1, ..setup() }), WasherStatus::Null);
         assert_eq!(
-            status(&WasherSetup { profile: c"table".as_ptr(), ..setup() }),
+            new_status(&WasherSetup { constants: 1, ..example_setup() }),
+            WasherStatus::Null
+        );
+        assert_eq!(
+            new_status(&WasherSetup { profile: c"table".as_ptr(), ..example_setup() }),
             WasherStatus::OutOfRange
         );
     }
@@ -318,7 +329,7 @@ mod tests {
     fn the_jacobian_agrees_with_differences_of_the_right_hand_side() {
         for model in [c"nonlinear", c"linear"] {
             let mut machine = ptr::null_mut();
-            let setup = WasherSetup { model: model.as_ptr(), ..setup() };
+            let setup = WasherSetup { model: model.as_ptr(), ..example_setup() };
             // SAFETY: setup and arrays live until the machine is freed.
             unsafe {
                 assert_eq!(washer_new(&raw const setup, &raw mut machine), WasherStatus::Ok);

@@ -19,7 +19,7 @@ use lane_ode::{Failure, Simd};
 use washer_model::{Channel, ModelKind, instant_count};
 use washer_row::{Status, Trajectory};
 
-use crate::point::{Answer, PointError, check, motion, point_input};
+use crate::point::{Answer, PointError, check_point, integrate_motion, point_input};
 use crate::setup::Setup;
 
 #[derive(Default)]
@@ -30,18 +30,18 @@ struct ModuleState {
 }
 
 /// The state between two calls of exports. A module has one thread.
-static STATE: Mutex<ModuleState> =
+static MODULE_STATE: Mutex<ModuleState> =
     Mutex::new(ModuleState { input: Vec::new(), output: Vec::new(), setup: None });
 
-fn state() -> MutexGuard<'static, ModuleState> {
-    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock_state() -> MutexGuard<'static, ModuleState> {
+    MODULE_STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Allocates the input for `count` numbers and returns its address.
 // SAFETY (of every export): no other symbol of the module has its name.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(count: usize) -> *mut f64 {
-    let mut state = state();
+    let mut state = lock_state();
     state.input.clear();
     state.input.resize(count, 0.0);
     state.input.as_mut_ptr()
@@ -50,7 +50,7 @@ pub extern "C" fn input(count: usize) -> *mut f64 {
 /// Returns the address of the last answer, which is valid until the next call of an export.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const f64 {
-    state().output.as_ptr()
+    lock_state().output.as_ptr()
 }
 
 /// Returns the number of trajectories that are integrated side by side.
@@ -62,14 +62,14 @@ pub extern "C" fn lanes() -> usize {
 /// Reads the setup from the input. Returns 1 if it is valid, else 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn setup() -> usize {
-    let state = &mut *state();
+    let state = &mut *lock_state();
     state.setup = Setup::from_numbers(&state.input);
     usize::from(state.setup.is_some())
 }
 
 /// Writes an answer from the setup and the input, and returns its length; 0 without a setup.
 fn answer_with_setup(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
-    let ModuleState { input, output, setup } = &mut *state();
+    let ModuleState { input, output, setup } = &mut *lock_state();
     output.clear();
     if let Some(setup) = setup {
         write(setup, input, output);
@@ -82,7 +82,7 @@ fn answer_with_setup(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize
 pub extern "C" fn quick(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {
         let points: Vec<&[f64]> = input.chunks_exact(value_count.max(1)).collect();
-        for answer in crate::quick(setup, &points) {
+        for answer in crate::evaluate_points(setup, &points) {
             write_answer(output, &answer, setup);
         }
     })
@@ -91,7 +91,9 @@ pub extern "C" fn quick(value_count: usize) -> usize {
 /// Answers one point with an error estimate.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
-    answer_with_setup(|setup, input, output| write_answer(output, &check(setup, input), setup))
+    answer_with_setup(|setup, input, output| {
+        write_answer(output, &check_point(setup, input), setup)
+    })
 }
 
 /// Writes the motion of a model (0 nonlinear, 1 linear) at a point and a refinement level; the
@@ -101,7 +103,7 @@ pub extern "C" fn checked() -> usize {
 pub extern "C" fn history(model: usize, level_index: usize, every_s: f64) -> usize {
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
     answer_with_setup(|setup, input, output| {
-        match motion(setup, input, model, Some(level_index), every_s) {
+        match integrate_motion(setup, input, model, Some(level_index), every_s) {
             Err(reason) => output.push(point_code(Some(&reason))),
             Ok(motion) => {
                 let [failure, time_s] = failure_code(motion.failure);
@@ -124,7 +126,7 @@ pub extern "C" fn history(model: usize, level_index: usize, every_s: f64) -> usi
 pub extern "C" fn growth(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {
         let Some((values, speeds_rpm)) = input.split_at_checked(value_count) else { return };
-        let disturbances = crate::growth(setup, values, speeds_rpm);
+        let disturbances = crate::find_disturbances(setup, values, speeds_rpm);
         output.push(point_code(disturbances.as_ref().err()));
         for disturbance in disturbances.unwrap_or_default() {
             output.extend(disturbance.map_or([f64::NAN; 4], |(disturbance, is_on_curve)| {
@@ -144,7 +146,7 @@ pub extern "C" fn growth(value_count: usize) -> usize {
 pub extern "C" fn dwell(value_count: usize) -> usize {
     answer_with_setup(|setup, input, output| {
         let Some((values, speeds_rpm)) = input.split_at_checked(value_count) else { return };
-        let largest_attractor = crate::dwell(setup, values, speeds_rpm);
+        let largest_attractor = crate::find_largest_attractor(setup, values, speeds_rpm);
         output.push(point_code(largest_attractor.as_ref().err()));
         match largest_attractor.ok().flatten() {
             Some(attractor) => {
@@ -190,11 +192,11 @@ fn write_answer(output: &mut Vec<f64>, result: &Result<Answer, PointError>, setu
         output.resize(output.len() + number_count, f64::NAN);
         return;
     };
-    let Answer { outcome, amplitudes, ratios, level_indices, methods, errors } = answer;
+    let Answer { outcome, amplitudes, ratios, level_indices, method_kinds, errors } = answer;
     output.push(f64::from(u8::from(outcome.sensitive == Some(true))));
     for (model, run) in [&outcome.nonlinear, &outcome.linear].into_iter().enumerate() {
         let error = errors[model].unwrap_or(f64::NAN);
-        output.extend([level_indices[model] as f64, f64::from(methods[model] as u8), error]);
+        output.extend([level_indices[model] as f64, f64::from(method_kinds[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics, .. } = run;
         // Failures of runs are the first statuses, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));

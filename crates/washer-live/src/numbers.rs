@@ -72,8 +72,12 @@ impl NumberWalk<'_> {
 
     /// Writes the length of a list, or reads a length and resizes the list. The elements are
     /// written or read separately.
-    pub(crate) fn walk_length<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
-        list.resize(self.walk_count(list.len())?, blank.clone());
+    pub(crate) fn walk_length<T: Clone>(
+        &mut self,
+        list: &mut Vec<T>,
+        blank_element: &T,
+    ) -> Option<()> {
+        list.resize(self.walk_count(list.len())?, blank_element.clone());
         Some(())
     }
 }

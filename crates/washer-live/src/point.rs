@@ -35,7 +35,7 @@ pub struct Answer {
     /// The index of the refinement level of each model's numbers.
     pub level_indices: [usize; 2],
     /// The kind of the method of each model's numbers.
-    pub methods: [MethodKind; 2],
+    pub method_kinds: [MethodKind; 2],
     /// The estimated relative error of each model's numbers, if it is known.
     pub errors: [Option<f64>; 2],
 }
@@ -57,8 +57,9 @@ impl Answer {
         let mut all_channels_outcome = Outcome::new(outcome.point, nonlinear, linear);
         all_channels_outcome.compare(&Channel::ALL, limits);
         let ratios = all_channels_outcome.verdict.ratios;
-        let methods = [0, 1].map(|model| levels_by_model[model].levels[level_indices[model]].kind);
-        Self { outcome, amplitudes, ratios, level_indices, methods, errors: [None; 2] }
+        let method_kinds =
+            [0, 1].map(|model| levels_by_model[model].levels[level_indices[model]].kind);
+        Self { outcome, amplitudes, ratios, level_indices, method_kinds, errors: [None; 2] }
     }
 }
 
@@ -97,11 +98,15 @@ pub(crate) fn point_input(setup: &Setup, values: &[f64]) -> Result<PointInput, P
 
 /// Returns the refinement levels of both models for these values of the sliders.
 fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLevels; 2] {
-    let other_sliders = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
-    let has_moved = |(parameter, value): (&washer_model::MachineParameter, &f64)| {
+    let other_sliders = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axis_count);
+    let differs_from_setup = |(parameter, value): (&washer_model::MachineParameter, &f64)| {
         parameter.get(&setup.machine, &setup.spin) != Some(*value)
     };
-    if other_sliders.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }
+    if other_sliders.into_iter().any(differs_from_setup) {
+        &setup.wide_levels
+    } else {
+        &setup.levels
+    }
 }
 
 /// Prepares a point for integration.
@@ -117,7 +122,7 @@ fn prepare_point(setup: &Setup, values: &[f64]) -> Result<Point, PointError> {
 }
 
 /// Integrates both models at some points at the quick level, in lanes, without an error estimate.
-pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>> {
+pub fn evaluate_points(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>> {
     let prepared_points: Vec<_> = points
         .iter()
         .map(|values| (refinement_levels(setup, values), prepare_point(setup, values)))
@@ -153,7 +158,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, PointError>
 /// # Errors
 ///
 /// Returns a [`PointError`] if the point is impossible or has no equilibrium.
-pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
+pub fn check_point(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> {
     let point = prepare_point(setup, values)?;
     let levels = refinement_levels(setup, values);
     let rule = &setup.rule;
@@ -204,23 +209,24 @@ fn quick_level_index(levels: &RefinementLevels) -> usize {
 }
 
 /// Integrates the motion of one model at a point, at a refinement level or by default at the quick
-/// one, and returns it at intervals of `every_s` from 0 to the end.
+/// one, and returns it at intervals of `interval_s` from 0 to the end.
 ///
 /// # Errors
 ///
 /// Returns a [`PointError`] if the point is impossible or has no equilibrium.
-pub fn motion(
+pub fn integrate_motion(
     setup: &Setup,
     values: &[f64],
     model: ModelKind,
     level_index: Option<usize>,
-    every_s: f64,
+    interval_s: f64,
 ) -> Result<PointHistory, PointError> {
     let point = prepare_point(setup, values)?;
     let levels = &refinement_levels(setup, values)[model as usize];
     let method = level_index.and_then(|level_index| levels.levels.get(level_index));
     let method = method.unwrap_or(&levels.levels[quick_level_index(levels)]);
-    let history = integrate_history(model, method, &point, &InitialDeviation::default(), every_s);
+    let history =
+        integrate_history(model, method, &point, &InitialDeviation::default(), interval_s);
     let instants = (0..history.len()).filter_map(|k| history.instant_outputs(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
@@ -233,7 +239,7 @@ pub fn motion(
 /// # Errors
 ///
 /// Returns a [`PointError`] if the point is impossible or has no equilibrium.
-pub fn growth(
+pub fn find_disturbances(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
@@ -253,7 +259,7 @@ pub fn growth(
 /// # Errors
 ///
 /// Returns a [`PointError`] if the point is impossible or has no equilibrium.
-pub fn dwell(
+pub fn find_largest_attractor(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],

@@ -35,7 +35,7 @@ pub struct Sliders {
     /// The parameters, axes of the map first.
     pub parameters: Vec<MachineParameter>,
     /// The number of axes among them.
-    pub axes: usize,
+    pub axis_count: usize,
 }
 
 impl Setup {
@@ -64,7 +64,7 @@ impl Setup {
                 channels: Vec::new(),
                 measures: Measures::default(),
             },
-            sliders: Sliders { parameters: Vec::new(), axes: 0 },
+            sliders: Sliders { parameters: Vec::new(), axis_count: 0 },
             wide_levels: levels.clone(),
             levels,
         };
@@ -102,7 +102,7 @@ impl Setup {
         (measures.stops, measures.feet) = (machine.stops.len(), machine.feet.len());
         measures.dampers = machine.dampers.len();
         walk.walk_choices(&mut self.sliders.parameters, &parameters)?;
-        self.sliders.axes = walk.walk_count(self.sliders.axes)?;
+        self.sliders.axis_count = walk.walk_count(self.sliders.axis_count)?;
         let mut all_levels = self.levels.iter_mut().chain(&mut self.wide_levels);
         all_levels.try_for_each(|levels| walk_levels(walk, levels))
     }

@@ -1,4 +1,4 @@
-//! Functions for benchmarks, which evaluate parts of a step.
+//! Functions for benchmarks, which evaluate parts of the right-hand side.
 
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;

@@ -10,8 +10,8 @@ use core::ffi::CStr;
 /// - the output of the nonlinear model: `point` with an entry of `outputs::ChannelPoints` and an
 ///   axis, or `angle` with a coordinate;
 /// - `steady`: the coordinates on which the linear model's output depends;
-/// - `turning`, if the output has harmonics of theta: the coordinates of the cosine's and of the
-///   sine's part, and the parts (0: steady, 1: cosine, 2: sine) that exist at rest.
+/// - `turning`, if the output has harmonics of theta: the coordinates on which the cosine part and
+///   the sine part depend, and the parts (0: steady, 1: cosine, 2: sine) that are not 0 at rest.
 ///
 /// At the equilibrium the unbalance is up and the hinge is bent in the vertical plane only, so that
 /// no output along c2 has a sine at rest.

@@ -13,7 +13,7 @@ mod turns;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::run::model::{LaneModel, Nonlinear};
+use crate::run::model::{LaneModel, NonlinearModel};
 use crate::stability::period_map::TurnSetup;
 use crate::stability::settings::{HeldCase, Settings};
 use crate::{HeldSpeed, Modes, Reading, Recorders, Response, ResponseError, find_responses};
@@ -148,7 +148,7 @@ pub struct Attractor {
     /// equilibrium.
     pub sections: Vec<[f64; STATES]>,
     /// The records of [`StartRule::recorders`] over 128 further turns.
-    pub extra: Reading,
+    pub extra_reading: Reading,
 }
 
 /// The motions in which a machine ends at a held speed.
@@ -281,10 +281,10 @@ fn record_motions<'a, 'f>(
             motions.push(motion);
         }
     }
-    for (motion, (_, extra)) in
+    for (motion, (_, extra_reading)) in
         motions.into_iter().zip(record_turns(simd, &held_states, WINDOW_TURNS, recorders))
     {
-        motion.extra = extra;
+        motion.extra_reading = extra_reading;
     }
 }
 
@@ -402,7 +402,7 @@ impl<'a> SpeedSearch<'a> {
     ) -> Self {
         let point = held_case.setup.point;
         let frozen_modes: Arc<Modes> = Arc::clone(&held_case.frozen_modes);
-        let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
+        let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point);
         let kicked_state = responses.first().map_or(rest_state, |response| response.start_state);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));

@@ -7,10 +7,10 @@
 //! a [`Spin`] becomes a [`Point`]: [`prepare`] finds the static equilibrium and the linear model
 //! about it. A point is the input of
 //!
-//! * [`simulate`]: time histories of the nonlinear or the linear model through the lanes of an
-//!   integrator, and their [`Record`];
+//! * [`simulate`]: integrates trajectories of the nonlinear or the linear model in the lanes of a
+//!   vector register, and returns a [`Record`] of each;
 //! * [`Point::matrices`]: M, C, K and F of the linear model at an instant;
-//! * [`modes`] and [`campbell`]: natural motions at an instant, and followed over spin speed to the
+//! * [`modes`] and [`campbell`]: natural motions at an instant, and over spin speed, with the
 //!   resonances.
 //!
 //! `docs/equations.md` of the repository ("the model page") holds the equations by the numbers that

@@ -50,7 +50,7 @@ lane_struct! {
 
 /// The linear model of a machine.
 #[derive(Clone, Debug)]
-pub(crate) struct LinearModel {
+pub(crate) struct LinearCoefficients {
     pub(crate) constants: LinearConstants<f64>,
     pub(crate) rotor_coefficients: RotorCoefficients<f64>,
 }
@@ -62,10 +62,10 @@ pub(crate) struct Linearisation<'a, T> {
 }
 
 impl<T: Lane> OutOfLine for Linearisation<'_, T> {
-    type Output = Vec<LinearModel>;
+    type Output = Vec<LinearCoefficients>;
 
     #[inline(always)]
-    fn run(self) -> Vec<LinearModel> {
+    fn run(self) -> Vec<LinearCoefficients> {
         let Self { machine, q } = self;
         let zero = q[0].lit(0.0);
         let zeros = [zero; COORDINATES];
@@ -139,7 +139,7 @@ impl<T: Lane> OutOfLine for Linearisation<'_, T> {
             rotor_axis: Tilt::shaft(q).axis_partials(),
         };
         (0..T::LANES)
-            .map(|lane| LinearModel {
+            .map(|lane| LinearCoefficients {
                 constants: constants.get_lane(lane),
                 rotor_coefficients: lane_rotor_coefficients(
                     &samples,
@@ -249,7 +249,7 @@ pub struct Matrices {
     pub force: [f64; COORDINATES],
 }
 
-impl LinearModel {
+impl LinearCoefficients {
     /// Returns the model with another stiffness and damping of the tub.
     pub(crate) fn with_tub_tangents(
         &self,

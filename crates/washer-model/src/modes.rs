@@ -7,7 +7,7 @@ pub(crate) mod campbell;
 pub(crate) mod shape;
 
 use crate::coordinates::{HINGE_PITCH, HINGE_YAW, SHAFT_COORDINATES, STATES, TUB_COORDINATES};
-use crate::linear::LinearModel;
+use crate::linear::LinearCoefficients;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::BACKWARD_WHIRL_RATIO;
 use crate::{COORDINATES, Caps, Matrices, ModelKind, Point};
@@ -126,7 +126,8 @@ pub(crate) fn modes_with_caps(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<Modes, ModesError> {
-    let system = first_order_system(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
+    let system =
+        first_order_system(point, &point.linear_coefficients, theta_rad, speed_rad_per_s, caps)?;
     let mass = system.mass;
     let decomposition = system.matrix.eigen().map_err(|_| ModesError::Eigenvalues)?;
     let eigenvalues = decomposition.S().column_vector();
@@ -153,7 +154,7 @@ pub(crate) fn mode_roots(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<[ModeRoot; COORDINATES], ModesError> {
-    let system = first_order_system(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
+    let system = first_order_system(point, &point.linear_coefficients, 0.0, speed_rad_per_s, caps)?;
     let eigenvalues = system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)?;
     if eigenvalues.iter().filter(|s| s.im == 0.0).count() > 2 {
         // If several modes are overdamped, their shapes decide which two real rates belong to one
@@ -278,7 +279,7 @@ pub(crate) fn highest_capped_frequency_rad_per_s(
 ) -> Result<f64, ModesError> {
     let mut highest_rad_per_s = 0.0_f64;
     let steepest_model = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
-    let models = core::iter::once(&point.linear).chain(steepest_model);
+    let models = core::iter::once(&point.linear_coefficients).chain(steepest_model);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
         let system = first_order_system(point, model, theta, speed_rad_per_s, caps)?;
@@ -299,7 +300,7 @@ pub(crate) fn highest_capped_frequency_rad_per_s(
 /// The errors of [`modes`].
 pub(crate) fn highest_rigid_frequency_rad_per_s(
     point: &Point,
-    model: &LinearModel,
+    model: &LinearCoefficients,
 ) -> Result<f64, ModesError> {
     let zero_spin = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &zero_spin);
@@ -331,7 +332,7 @@ struct FirstOrderSystem {
 /// Computes the first-order form at a frozen angle and a spin speed.
 fn first_order_system(
     point: &Point,
-    model: &LinearModel,
+    model: &LinearCoefficients,
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,

@@ -9,13 +9,13 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{TUB_PITCH, TUB_Y};
 use crate::lanes::InLanes as _;
 use crate::linear::outputs::{LinearOutputs, OutputLinearisation};
-use crate::linear::{LinearModel, Linearisation, tub_tangents};
+use crate::linear::{LinearCoefficients, Linearisation, tub_tangents};
 use crate::machine::feet::Feet;
 use crate::machine::spin::{SpinSegment, SpinState, segment_index};
 use crate::nonlinear::coefficients::MachineCoefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates};
-use crate::point::ringing::{Jumps, Ringing};
+use crate::point::ringing::{AccelerationJumps, Ringing};
 use crate::{
     COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing, UnresolvedModes,
 };
@@ -39,14 +39,14 @@ pub struct Timing {
 /// Basis: far above rounding, and so small that the separation of a chaotic motion grows by a
 /// factor of e twenty times before it is as large as the motion. Doubling it reduces this number by
 /// less than one.
-const PERTURBATION: f64 = 1e-10;
+const INITIAL_PERTURBATION: f64 = 1e-10;
 
 /// The greatest deviation of a machine at rest, relative to the clearance between drum and tub (for
 /// angles, to the clearance over a lever of one metre).
 ///
 /// Basis: rounding of an equilibrium leaves about 1e-15 of the clearance, and a billionth of it has
 /// no effect on any machine. Doubling it changes no row.
-const REST_SHARE: f64 = 1e-9;
+const REST_DEVIATION_SHARE: f64 = 1e-9;
 
 /// The error of a machine without a stable static equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -76,14 +76,14 @@ pub struct Point {
     pub(crate) machine: MachineCoefficients<f64>,
     pub(crate) equilibrium: [f64; COORDINATES],
     /// The channels at the equilibrium (m, rad).
-    pub(crate) channels_at_rest: [f64; CHANNELS],
-    pub(crate) linear: LinearModel,
+    pub(crate) channel_rest_values: [f64; CHANNELS],
+    pub(crate) linear_coefficients: LinearCoefficients,
     pub(crate) linear_outputs: LinearOutputs<f64>,
     /// The speed amplitudes of the dampers with friction.
     pub(crate) friction_speeds: Vec<FrictionSpeed>,
     /// The linear model with the steepest tangents of all elements, which limits explicit steps;
     /// `None` if these are the tangents at equilibrium.
-    pub(crate) steepest_model: Option<Box<LinearModel>>,
+    pub(crate) steepest_model: Option<Box<LinearCoefficients>>,
     pub(crate) spin_segments: Arc<[SpinSegment]>,
     pub(crate) segments: Arc<[PlannedSegment]>,
     pub(crate) ringing: Ringing,
@@ -103,7 +103,7 @@ pub(crate) struct PlannedSegment {
     pub(crate) start_s: f64,
     pub(crate) end_s: f64,
     /// The index of the spin segment.
-    pub(crate) spin_segment: usize,
+    pub(crate) spin_segment_index: usize,
     /// Whether the segment is within the window.
     pub(crate) is_in_window: bool,
     /// The greatest speed of the drum up to the end of the segment (rad/s).
@@ -125,8 +125,8 @@ impl Point {
     }
 
     /// Returns a bound on the swing of unresolved modes after all jumps of the drum's acceleration.
-    pub fn ringing(&self, unresolved: UnresolvedModes) -> Swing {
-        self.ringing.swing(unresolved)
+    pub fn ringing(&self, unresolved_modes: UnresolvedModes) -> Swing {
+        self.ringing.swing(unresolved_modes)
     }
 
     /// Returns the point with an initial deviation of 1e-10 (m, rad) in every coordinate of the
@@ -134,7 +134,7 @@ impl Point {
     /// are too long.
     #[must_use]
     pub fn perturbed(&self) -> Self {
-        Self { perturbation: PERTURBATION, ..self.clone() }
+        Self { perturbation: INITIAL_PERTURBATION, ..self.clone() }
     }
 
     /// Returns the point with the instants (s, rising) of the snapshots of
@@ -156,7 +156,7 @@ impl Point {
 
     /// Returns the greatest deviation of a machine at rest (m; rad for angles).
     pub fn rest_limit_m(&self) -> f64 {
-        REST_SHARE * self.clearance_m()
+        REST_DEVIATION_SHARE * self.clearance_m()
     }
 
     /// Returns the edges of the window (s).
@@ -182,7 +182,7 @@ impl Point {
         };
         let speed_factor = |friction_speed: &FrictionSpeed| {
             let speed = speeds_m_per_s
-                .get(friction_speed.damper)?
+                .get(friction_speed.damper_index)?
                 .max(friction_speed.viscous_limit_m_per_s);
             let speed_ratio =
                 friction_speed.speed_m_per_s.max(friction_speed.viscous_limit_m_per_s) / speed;
@@ -194,10 +194,10 @@ impl Point {
     /// Returns the point with other speed amplitudes (m/s) for the dampers whose amplitudes follow
     /// from the motion, in the order of these dampers.
     pub(crate) fn with_motion_friction_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
-        let mut speeds = speeds_m_per_s.iter().copied();
-        self.with_friction_speeds(
-            |friction_speed| if friction_speed.is_from_motion { speeds.next() } else { None },
-        )
+        let mut remaining_speeds = speeds_m_per_s.iter().copied();
+        self.with_friction_speeds(|friction_speed| {
+            if friction_speed.is_from_motion { remaining_speeds.next() } else { None }
+        })
     }
 
     /// Returns the point with a linear model without friction.
@@ -215,12 +215,15 @@ impl Point {
         for friction_speed in &mut point.friction_speeds {
             if let Some(speed_m_per_s) = new_speed(friction_speed) {
                 friction_speed.speed_m_per_s = speed_m_per_s;
-                point.machine.elements.linearise_friction(friction_speed.damper, speed_m_per_s);
+                point
+                    .machine
+                    .elements
+                    .linearise_friction(friction_speed.damper_index, speed_m_per_s);
             }
         }
         let tangents =
             tub_tangents(&point.machine.with_viscous_friction(), &self.equilibrium.map(N));
-        point.linear = point.linear.with_tub_tangents(tangents);
+        point.linear_coefficients = point.linear_coefficients.with_tub_tangents(tangents);
         point
     }
 
@@ -233,7 +236,7 @@ impl Point {
     ) -> Matrices {
         let spin =
             SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(acceleration_rad_per_s2));
-        self.linear.matrices(&self.machine.bodies, &spin)
+        self.linear_coefficients.matrices(&self.machine.bodies, &spin)
     }
 }
 
@@ -260,56 +263,63 @@ impl Kernel for PreparationKernel<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero);
-        let mut prepared = Vec::with_capacity(self.points.len());
+        let mut prepared_points = Vec::with_capacity(self.points.len());
         let mut planned_spins = self.planned_spins.into_iter();
         for group in self.points.chunks(T::LANES) {
             let mut machines: Vec<_> =
                 group.iter().map(|(machine, _)| MachineCoefficients::new(machine)).collect();
-            let lanes = copy_to_lanes(zero, &machines);
-            let (q, solved_lanes) =
-                zero.0.run_out_of_line(equilibrium::EquilibriumSolution { zero, machine: &lanes });
+            let lane_coefficients = copy_to_lanes(zero, &machines);
+            let (q, solved_lanes) = zero.0.run_out_of_line(equilibrium::EquilibriumSolution {
+                zero,
+                machine: &lane_coefficients,
+            });
             for (lane, machine) in machines.iter_mut().enumerate() {
                 machine.elements.centre_free_strokes(&q.map(|q| q.0.get(lane)));
             }
             let steepest_tangents = steepest_tangents(&machines, &q);
             let viscous_machines: Vec<_> =
                 machines.iter().map(MachineCoefficients::with_viscous_friction).collect();
-            let linear = zero.0.run_out_of_line(Linearisation {
+            let linear_coefficients = zero.0.run_out_of_line(Linearisation {
                 machine: &copy_to_lanes(zero, &viscous_machines),
                 q: &q,
             });
-            let linear_outputs =
-                zero.0.run_out_of_line(OutputLinearisation { bodies: &lanes.bodies, q: &q });
+            let linear_outputs = zero
+                .0
+                .run_out_of_line(OutputLinearisation { bodies: &lane_coefficients.bodies, q: &q });
             let zeros = [zero; COORDINATES];
             let rest_coordinates = MovingCoordinates { q, u: zeros, a: zeros };
             let spin_at_rest = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest_channels = BodyAxes::new(&spin_at_rest, &rest_coordinates)
-                .channels(&lanes.bodies, &rest_coordinates);
-            let models = zip(zip(machines, linear), zip(linear_outputs, steepest_tangents));
+                .channels(&lane_coefficients.bodies, &rest_coordinates);
+            let models =
+                zip(zip(machines, linear_coefficients), zip(linear_outputs, steepest_tangents));
             let inputs = zip(group, planned_spins.by_ref());
             for (lane, (model, ((machine, _), planned_spin))) in zip(models, inputs).enumerate() {
                 if solved_lanes >> lane & 1 == 0 {
                     let q = q.map(|q| q.0.get(lane));
                     let unstable_motion = equilibrium::unstable_motion(&model.0.0, &q);
-                    prepared.push(Err(NoEquilibrium { unstable_motion }));
+                    prepared_points.push(Err(NoEquilibrium { unstable_motion }));
                     continue;
                 }
-                let ((coefficients, linear), (linear_outputs, steepest_tangents)) = model;
-                let steepest_model =
-                    steepest_tangents.map(|tangents| Box::new(linear.with_tub_tangents(tangents)));
+                let ((coefficients, linear_coefficients), (linear_outputs, steepest_tangents)) =
+                    model;
+                let steepest_model = steepest_tangents
+                    .map(|tangents| Box::new(linear_coefficients.with_tub_tangents(tangents)));
                 let matrices_at = |angle_rad: f64, acceleration_rad_per_s2: f64| {
                     let spin =
                         SpinState::new(N(angle_rad).sin_cos(), N(0.0), N(acceleration_rad_per_s2));
-                    linear.matrices(&coefficients.bodies, &spin)
+                    linear_coefficients.matrices(&coefficients.bodies, &spin)
                 };
-                prepared.push(Ok(Point {
+                prepared_points.push(Ok(Point {
                     ringing: Ringing::new(machine, planned_spin.jumps, matrices_at),
                     perturbation: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
                     equilibrium: q.map(|q| q.0.get(lane)),
-                    channels_at_rest: core::array::from_fn(|i| rest_channels[i].value.0.get(lane)),
-                    linear,
+                    channel_rest_values: core::array::from_fn(|i| {
+                        rest_channels[i].value.0.get(lane)
+                    }),
+                    linear_coefficients,
                     linear_outputs,
                     friction_speeds: FrictionSpeed::for_dampers(machine),
                     steepest_model,
@@ -320,7 +330,7 @@ impl Kernel for PreparationKernel<'_> {
                 }));
             }
         }
-        prepared
+        prepared_points
     }
 }
 
@@ -330,11 +340,11 @@ fn copy_to_lanes<T: Lane>(
     zero: N<T>,
     machines: &[MachineCoefficients<f64>],
 ) -> MachineCoefficients<T> {
-    let mut lanes = MachineCoefficients::splat(zero, &machines[0]);
+    let mut lane_coefficients = MachineCoefficients::splat(zero, &machines[0]);
     for (lane, machine) in machines.iter().enumerate() {
-        lanes.set_lane(lane, machine);
+        lane_coefficients.set_lane(lane, machine);
     }
-    lanes
+    lane_coefficients
 }
 
 /// Computes the stiffness and the damping of each machine's tub with the steepest tangents of all
@@ -356,7 +366,7 @@ fn steepest_tangents<T: Lane>(
 struct PlannedSpin {
     spin_segments: Arc<[SpinSegment]>,
     segments: Arc<[PlannedSegment]>,
-    jumps: Arc<Jumps>,
+    jumps: Arc<AccelerationJumps>,
 }
 
 /// Plans the spin of each point. Consecutive points with the same spin share a plan, because a
@@ -368,7 +378,7 @@ fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
             if k > 0 && points[k - 1].1 == *spin { planned_spins.last().cloned() } else { None };
         planned_spins.push(shared_plan.unwrap_or_else(|| {
             let spin_segments = spin.segments();
-            let jumps = Jumps::new(&spin_segments, timing).into();
+            let jumps = AccelerationJumps::new(&spin_segments, timing).into();
             let segments = plan_segments(&spin_segments, timing).into();
             PlannedSpin { segments, jumps, spin_segments: spin_segments.into() }
         }));
@@ -379,27 +389,29 @@ fn plan_spins(points: &[(Machine, Spin)], timing: &Timing) -> Vec<PlannedSpin> {
 /// Divides the run into segments at every kink of the spin, edge of the window and checkpoint.
 pub(crate) fn plan_segments(spin_segments: &[SpinSegment], timing: &Timing) -> Vec<PlannedSegment> {
     let [from, to] = timing.window_s;
-    let kinks = spin_segments.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
+    let boundary_times_s =
+        spin_segments.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
     let part_count = f64::from(timing.checkpoints);
-    let kinks =
-        kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / part_count)));
-    let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup();
+    let boundary_times_s = boundary_times_s
+        .chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / part_count)));
+    let mut sorted_times_s: Vec<f64> =
+        boundary_times_s.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
+    sorted_times_s.sort_by(f64::total_cmp);
+    sorted_times_s.dedup();
     let mut max_speed_rad_per_s = 0.0_f64;
-    times
+    sorted_times_s
         .windows(2)
         .map(|pair| {
             let start_s = pair[0];
             let end_s = pair[1];
-            let spin_segment = segment_index(spin_segments, start_s);
+            let spin_segment_index = segment_index(spin_segments, start_s);
             // The speed is monotonic within a spin segment.
             for time_s in [start_s, end_s] {
                 max_speed_rad_per_s = max_speed_rad_per_s
-                    .max(spin_segments[spin_segment].speed_rad_per_s(time_s).abs());
+                    .max(spin_segments[spin_segment_index].speed_rad_per_s(time_s).abs());
             }
             let is_in_window = from <= start_s && end_s <= to;
-            PlannedSegment { start_s, end_s, spin_segment, is_in_window, max_speed_rad_per_s }
+            PlannedSegment { start_s, end_s, spin_segment_index, is_in_window, max_speed_rad_per_s }
         })
         .collect()
 }

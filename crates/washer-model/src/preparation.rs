@@ -20,9 +20,9 @@ use crate::{
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
-/// The relative tolerance of a speed amplitude: of the residual, and of the step to the fixed
-/// point, which near a resonance is many times as long. Basis: the error of the equivalent damping
-/// is then below that of its idealisation. Doubling it saves less than a run.
+/// The relative tolerance of a speed amplitude, both of the residual and of the Broyden step, which
+/// near a resonance is many times as long. Basis: the error of the equivalent damping is then below
+/// that of its idealisation. Doubling it saves less than a run.
 const SPEED_TOLERANCE: f64 = 5e-3;
 
 /// The greatest number of linear runs. Basis: three or four are usual, and 38 were needed between
@@ -30,8 +30,8 @@ const SPEED_TOLERANCE: f64 = 5e-3;
 /// point.
 pub(crate) const MAX_RUNS: usize = 48;
 
-/// The phase of the fastest motion in a step of the first runs, rad. Basis: it gives speeds within
-/// a percent. Doubling it gives errors 16 times as large.
+/// The product of step and frequency of the fastest mode in the first runs (rad). Basis: it gives
+/// speeds within a percent. Doubling it gives errors 16 times as large.
 const FIRST_STEP_PHASE_RAD: f64 = 0.4;
 
 /// The step of the last runs, as a share of that of the first. Basis: it gives speeds within a
@@ -40,8 +40,8 @@ const FIRST_STEP_PHASE_RAD: f64 = 0.4;
 /// four percent.
 const FINE_STEP_SHARE: f64 = 0.25;
 
-/// The factor of the step after an unstable run. Basis: a compromise between failed runs and
-/// short steps, not measured. Doubling it would lengthen steps.
+/// The factor by which the step is shortened after an unstable run. Basis: a compromise between
+/// failed runs and short steps, not measured. Doubling it would lengthen steps.
 const STEP_REDUCTION_FACTOR: f64 = 0.7;
 
 /// The shortest step, as a share of the first. Basis: thirteen reductions. Doubling it allows two
@@ -52,13 +52,13 @@ const MIN_STEP_SHARE: f64 = 0.01;
 /// Doubling it is unstable.
 const CAP_STABILITY_SHARE: f64 = 0.9;
 
-/// The number of binary digits of a step after the first. Basis: with one, points of a map have
-/// equal steps and share the lanes of a batch, and a step is at most a third shorter than
+/// The number of binary digits of a step after its first binary digit. Basis: with one, points of a
+/// map have equal steps and share the lanes of a batch, and a step is at most a third shorter than
 /// necessary. Doubling it divides batches further.
 const STEP_BITS: u32 = 1;
 
-/// The number of binary digits of a decay after the first. Basis: the last digits of an eigenvalue
-/// depend on the processor. Doubling it would keep such digits.
+/// The number of binary digits of a decay after its first binary digit. Basis: the last digits of
+/// an eigenvalue depend on the processor. Doubling it would keep such digits.
 const DECAY_BITS: u32 = 20;
 
 /// A search for the speed amplitudes of a point.
@@ -216,7 +216,9 @@ fn dot_product(a: &[f64], b: &[f64]) -> f64 {
 pub(crate) fn select_motion_speeds(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
     let motion_friction_speeds =
         point.friction_speeds.iter().filter(|friction_speed| friction_speed.is_from_motion);
-    motion_friction_speeds.map(|friction_speed| speeds_m_per_s[friction_speed.damper]).collect()
+    motion_friction_speeds
+        .map(|friction_speed| speeds_m_per_s[friction_speed.damper_index])
+        .collect()
 }
 
 /// A point and the search for its speed amplitudes.
@@ -253,7 +255,7 @@ pub fn prepare(
         let point =
             Point { segments, ..point.with_motion_friction_speeds(&search.speeds_m_per_s()) };
         let highest_frequency_rad_per_s =
-            highest_rigid_frequency_rad_per_s(&point, &point.linear).ok()?;
+            highest_rigid_frequency_rad_per_s(&point, &point.linear_coefficients).ok()?;
         let step_s = round_down_to_bits(
             FIRST_STEP_PHASE_RAD
                 / highest_frequency_rad_per_s.max(point.segments.last()?.max_speed_rad_per_s),

@@ -231,7 +231,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
     #[inline(always)]
     fn observe(&mut self, forcing: &M::Forcing, step: &ObservedStep<'_, T, STATES>) {
         let lanes_in_window = self.lanes_in_window();
-        let (radial, channels) = self.model.observe(
+        let (radial_position, channels) = self.model.observe(
             forcing,
             step.end_state,
             step.end_slope,
@@ -243,14 +243,14 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
             self.record(
                 step_times,
                 (step.end_state, step.end_slope),
-                &radial,
+                &radial_position,
                 &channels,
                 lanes_in_window,
             );
         }
         self.radial_peaks.advance(
             step.length_s,
-            &[squared_distance(&radial)],
+            &[squared_distance(&radial_position)],
             all_lanes(self.window_indicator),
         );
     }
@@ -276,12 +276,14 @@ impl<T: Lane, M: LaneModel<T>> OutOfLine for RecordStart<'_, '_, T, M> {
     fn run(self) {
         let Self { task, forcing, x, dx } = self;
         let lanes_in_window = task.lanes_in_window();
-        let (radial, channels) = task.model.observe(forcing, x, dx, T::bits(lanes_in_window) != 0);
+        let (radial_position, channels) =
+            task.model.observe(forcing, x, dx, T::bits(lanes_in_window) != 0);
         if let Some(channels) = channels {
             task.channel_peaks.begin(&channels, lanes_in_window);
-            task.record(None, (x, dx), &radial, &channels, lanes_in_window);
+            task.record(None, (x, dx), &radial_position, &channels, lanes_in_window);
         }
-        task.radial_peaks.begin(&[squared_distance(&radial)], all_lanes(task.window_indicator));
+        task.radial_peaks
+            .begin(&[squared_distance(&radial_position)], all_lanes(task.window_indicator));
     }
 }
 
@@ -348,7 +350,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         &mut self,
         step: Option<(N<T>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
-        radial: &[Sample<T>; RADIAL_COMPONENTS],
+        radial_position: &[Sample<T>; RADIAL_COMPONENTS],
         channels: &[Sample<T>; CHANNELS],
         lanes_in_window: T::Mask,
     ) {
@@ -358,7 +360,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
                 step,
                 x,
                 dx,
-                radial,
+                radial_position,
                 channels,
                 lanes_in_window,
             });

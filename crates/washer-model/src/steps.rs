@@ -38,54 +38,54 @@ const STEP_BITS: u32 = 20;
 
 /// The number of bisections of the interval of the longest step. Basis: they find its logarithm to
 /// 2^-10 of the interval, about 0.6 % of the step. Doubling it doubles the time.
-const BISECTIONS: usize = 10;
+const BISECTION_COUNT: usize = 10;
 
 /// The machines of a run with the frequencies that bound their steps.
 pub struct StepSelector<'a> {
-    machines: Vec<Result<Frequencies<'a>, ModesError>>,
+    machine_frequencies: Vec<Result<MachineFrequencies<'a>, ModesError>>,
     cancel: Cancel<'a>,
 }
 
 /// The frequencies of one machine.
-struct Frequencies<'a> {
+struct MachineFrequencies<'a> {
     point: &'a Point,
     /// The greatest speed of the drum.
     max_speed_rad_per_s: f64,
     /// The frequency of the fastest mode of the suspension at rest.
-    suspension_rad_per_s: f64,
+    suspension_frequency_rad_per_s: f64,
     /// The frequency of the slower mode of the hinge at rest.
     hinge_rad_per_s: f64,
     /// The highest frequency of all modes, at rest and at the drum's greatest speed.
     highest_frequency_rad_per_s: f64,
 }
 
-impl<'a> Frequencies<'a> {
+impl<'a> MachineFrequencies<'a> {
     fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, ModesError> {
         let max_speed_rad_per_s = spin.max_speed_rad_per_s(end_s);
-        let at_rest = mode_roots(point, 0.0, None)?;
-        let highest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
-        let highest_at_speed = highest_frequency_rad_per_s(point, max_speed_rad_per_s)?;
+        let rest_roots = mode_roots(point, 0.0, None)?;
+        let highest_at_rest_rad_per_s = highest_frequency_rad_per_s(point, 0.0)?;
+        let highest_at_speed_rad_per_s = highest_frequency_rad_per_s(point, max_speed_rad_per_s)?;
         Ok(Self {
             point,
             max_speed_rad_per_s,
-            suspension_rad_per_s: at_rest[SUSPENSION_MODES - 1].magnitude_rad_per_s,
-            hinge_rad_per_s: at_rest[SUSPENSION_MODES].magnitude_rad_per_s,
-            highest_frequency_rad_per_s: highest_at_rest.max(highest_at_speed),
+            suspension_frequency_rad_per_s: rest_roots[SUSPENSION_MODES - 1].magnitude_rad_per_s,
+            hinge_rad_per_s: rest_roots[SUSPENSION_MODES].magnitude_rad_per_s,
+            highest_frequency_rad_per_s: highest_at_rest_rad_per_s.max(highest_at_speed_rad_per_s),
         })
     }
 
     /// Whether a step with capped modes is stable, at rest and at the drum's greatest speed.
     fn is_stable(&self, model: ModelKind, step_s: f64) -> Result<bool, ModesError> {
-        let caps = caps(model, step_s);
-        let limit = Formula::for_model(model).limit();
+        let caps = caps_for_step(model, step_s);
+        let stability_limit = Formula::for_model(model).limit();
         for speed_rad_per_s in [self.max_speed_rad_per_s, 0.0] {
-            let highest = highest_capped_frequency_rad_per_s(
+            let highest_rad_per_s = highest_capped_frequency_rad_per_s(
                 self.point,
                 model,
                 speed_rad_per_s,
                 Some(&caps),
             )?;
-            if step_s * highest > limit {
+            if step_s * highest_rad_per_s > stability_limit {
                 return Ok(false);
             }
         }
@@ -94,14 +94,14 @@ impl<'a> Frequencies<'a> {
 }
 
 /// Returns the bearings' cap for a step; the hinge has none.
-fn caps(model: ModelKind, step_s: f64) -> Caps {
+fn caps_for_step(model: ModelKind, step_s: f64) -> Caps {
     let bearings_rad_per_s = CAP_LIMIT_SHARE * Formula::for_model(model).limit() / step_s;
     Caps { bearings_rad_per_s, hinge_rad_per_s: None }
 }
 
 /// Returns the method of a capped kind that integrates a model in these steps (s).
 pub fn capped_method(model: ModelKind, kind: MethodKind, step_s: f64) -> Method {
-    Method::capped(kind, step_s, caps(model, step_s))
+    Method::capped(kind, step_s, caps_for_step(model, step_s))
 }
 
 impl<'a> StepSelector<'a> {
@@ -120,16 +120,18 @@ impl<'a> StepSelector<'a> {
         cancel: Cancel<'a>,
     ) -> Self {
         let points = points.into_iter().take_while(|_| !cancel.is_requested());
-        let machines = points.map(|(point, spin)| Frequencies::new(point, spin, end_s)).collect();
-        Self { machines, cancel }
+        let machine_frequencies =
+            points.map(|(point, spin)| MachineFrequencies::new(point, spin, end_s)).collect();
+        Self { machine_frequencies, cancel }
     }
 
     /// Returns the longest step (s) at which a formula is stable at all points without capped
     /// modes; `None` if there are no points. Machines whose modes cannot be computed are skipped.
     pub fn plain_step_s(&self, formula: Formula) -> Option<f64> {
-        let machines = self.machines.iter().flatten();
-        let steps = machines.map(|machine| formula.limit() / machine.highest_frequency_rad_per_s);
-        steps.reduce(f64::min).map(round_down_step)
+        let machines = self.machine_frequencies.iter().flatten();
+        let step_limits_s =
+            machines.map(|machine| formula.limit() / machine.highest_frequency_rad_per_s);
+        step_limits_s.reduce(f64::min).map(round_down_step)
     }
 
     /// Returns the longest stable step (s) of a model's formula without capped modes.
@@ -140,7 +142,7 @@ impl<'a> StepSelector<'a> {
     /// Whether any machine has forces with corners, such as friction or stops. At corners errors do
     /// not decrease with the step by the order of a formula.
     pub fn has_nonsmooth_force(&self) -> bool {
-        let mut machines = self.machines.iter().flatten();
+        let mut machines = self.machine_frequencies.iter().flatten();
         machines.any(|machine| machine.point.machine.elements.has_nonsmooth_force())
     }
 
@@ -151,23 +153,23 @@ impl<'a> StepSelector<'a> {
     /// [`ModesError`] of a machine that has none.
     pub fn capped_step_s(&self, model: ModelKind) -> Result<Option<f64>, ModesError> {
         let Some(uncapped_s) = self.uncapped_step_s(model) else { return Ok(None) };
-        let mut machines = Vec::with_capacity(self.machines.len());
-        for machine in &self.machines {
+        let mut machines = Vec::with_capacity(self.machine_frequencies.len());
+        for machine in &self.machine_frequencies {
             machines.push(machine.as_ref().map_err(|none| *none)?);
         }
-        let is_whirling = |machine: &&Frequencies<'_>| {
+        let is_whirling = |machine: &&MachineFrequencies<'_>| {
             machine.hinge_rad_per_s < MIN_HINGE_SPEED_RATIO * machine.max_speed_rad_per_s
         };
         if machines.iter().any(is_whirling) {
             return Ok(None);
         }
-        let fastest_resolved = |fastest: f64, machine: &&Frequencies<'_>| {
-            fastest.max(machine.suspension_rad_per_s).max(machine.max_speed_rad_per_s)
+        let max_resolved_rad_per_s = |fastest: f64, machine: &&MachineFrequencies<'_>| {
+            fastest.max(machine.suspension_frequency_rad_per_s).max(machine.max_speed_rad_per_s)
         };
-        let resolved_rad_per_s = machines.iter().fold(0.0, fastest_resolved);
+        let resolved_rad_per_s = machines.iter().fold(0.0, max_resolved_rad_per_s);
         let mut stable_s = uncapped_s;
         let mut unstable_s = Formula::for_model(model).limit() / resolved_rad_per_s;
-        for _ in 0..BISECTIONS {
+        for _ in 0..BISECTION_COUNT {
             let midpoint_s = (stable_s * unstable_s).sqrt();
             let mut is_stable = true;
             for machine in &machines {
@@ -194,6 +196,6 @@ pub(crate) fn round_down_step(number: f64) -> f64 {
 
 /// Rounds a positive number down to `bits` binary digits after the first.
 pub(crate) fn round_down_to_bits(number: f64, bits: u32) -> f64 {
-    let dropped = f64::MANTISSA_DIGITS - 1 - bits;
-    f64::from_bits(number.to_bits() >> dropped << dropped)
+    let dropped_bits = f64::MANTISSA_DIGITS - 1 - bits;
+    f64::from_bits(number.to_bits() >> dropped_bits << dropped_bits)
 }

@@ -296,7 +296,7 @@ mod tests {
             time_s: 60.0,
             end_state: [0.0; washer_model::STATE_LEN],
             sections: Vec::new(),
-            extra: Reading::default(),
+            extra_reading: Reading::default(),
         }
     }
 

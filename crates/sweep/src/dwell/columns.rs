@@ -187,7 +187,7 @@ pub(crate) fn columns(
         let description = description.replace(" in the window", "");
         let name = column.column(MODEL_NAMES[0]);
         let unit = column.metric.properties().unit;
-        let value = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra);
+        let value = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra_reading);
         columns.push(ResultColumn::measured(name, unit, description, value));
     }
     let measured_columns: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [

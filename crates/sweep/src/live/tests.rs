@@ -22,10 +22,10 @@ fn plan(text: &str) -> Plan {
 
 /// Asserts that a checked point of a page is a row of the program.
 fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
-    let checked = washer_live::check(setup, values).unwrap();
+    let checked = washer_live::check_point(setup, values).unwrap();
     let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
     assert_eq!(errors, outcome.error, "{values:?}");
-    assert_eq!(checked.methods[0], outcome.method, "{values:?}");
+    assert_eq!(checked.method_kinds[0], outcome.method, "{values:?}");
     assert_eq!((checked.outcome, values), (Outcome { point: 0, ..outcome.clone() }, values));
     for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
         let channels = setup.rule.channels.iter();
@@ -69,7 +69,7 @@ stability = { speed_rpm = "200:240:20" }
         assert_eq!(outcome.linear.metrics.len(), 2);
         assert!(outcome.static_sag_m > Some(0.0));
         assert_is_row(outcome, &setup, &values);
-        let answer = washer_live::check(&setup, &values).unwrap();
+        let answer = washer_live::check_point(&setup, &values).unwrap();
         let verdict = &outcome.verdict;
         // The page has the ratios by turn of every channel.
         let turn_ratios = answer.outcome.turn_ratios;
@@ -89,7 +89,10 @@ fn motions_of_held_speeds_are_the_rows() {
     assert_eq!(metrics, [Metric::Dwell]);
     let (setup, _) = build_setup(&plan, &[]).unwrap();
     assert!(outcome.dwell_peaks.is_some());
-    assert_eq!(washer_live::dwell(&setup, &values, &speeds_rpm).unwrap(), outcome.dwell_peaks);
+    assert_eq!(
+        washer_live::find_largest_attractor(&setup, &values, &speeds_rpm).unwrap(),
+        outcome.dwell_peaks
+    );
 }
 
 #[test]

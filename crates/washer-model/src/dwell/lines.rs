@@ -64,7 +64,7 @@ fn fourier_means<const M: usize>(
 }
 
 /// Returns the power of all signals together at some frequencies.
-fn powers<const M: usize>(
+fn signal_powers<const M: usize>(
     signals: &[Vec<f64>],
     hann_weights: &[f64],
     frequencies: [f64; M],
@@ -110,7 +110,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
         let frequencies =
             from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
-        let frequency_powers = powers(&residuals, &hann_weights, frequencies);
+        let frequency_powers = signal_powers(&residuals, &hann_weights, frequencies);
         let trial_powers = frequency_powers.into_iter().zip(trials.iter().copied());
         strongest_power_and_trial =
             trial_powers.fold(strongest_power_and_trial, |strongest_power_and_trial, trial| {
@@ -126,7 +126,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     let mut max_frequency = frequency_at(strongest_trial + 1).min(0.5);
     for _ in 0..TERNARY_ROUNDS {
         let third_of_interval = (max_frequency - min_frequency) / 3.0;
-        let [lower_power, upper_power] = powers(
+        let [lower_power, upper_power] = signal_powers(
             &residuals,
             &hann_weights,
             [min_frequency + third_of_interval, max_frequency - third_of_interval],

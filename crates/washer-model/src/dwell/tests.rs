@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::coordinates::{COORDINATES, TUB_YAW};
-use crate::tests::elements::machine;
+use crate::tests::elements::read_machine;
 use crate::tests::reference::read_reference;
 use crate::{
     Channel, InitialDeviation, Method, ModelKind, Spin, Timing, integrate_history, prepare,
@@ -20,7 +20,7 @@ const REFERENCE_CHANNELS: [(Channel, &str); 4] = [
 fn prepare_at(keys: &Value, speed_rpm: f64, end_s: f64) -> crate::Point {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-    prepare(Simd::widest(), &[(machine(keys), spin)], &timing).remove(0).unwrap()
+    prepare(Simd::widest(), &[(read_machine(keys), spin)], &timing).remove(0).unwrap()
 }
 
 fn case_point(case: &Value) -> crate::Point {
@@ -289,7 +289,7 @@ fn random_kicks_end_in_motions_that_the_search_found() {
                 .remove(0)
                 .unwrap();
         let held_case = Settings::new(&point).held_case(speed_rpm).unwrap().without_caps().unwrap();
-        let state_at_rest = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
+        let state_at_rest = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(&point);
         let response =
             search_result.responses.first().map_or(state_at_rest, |response| response.start_state);
         let held_states: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))

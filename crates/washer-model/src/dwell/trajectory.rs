@@ -344,7 +344,7 @@ impl<'a> HeldTrajectory<'a> {
                 .iter()
                 .map(|turn| self.subtract_equilibrium(&turn.end_state))
                 .collect(),
-            extra: Reading::default(),
+            extra_reading: Reading::default(),
         }
     }
 

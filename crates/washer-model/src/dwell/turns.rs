@@ -3,7 +3,7 @@
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::run::active_recorders::{ActiveRecorders, Substeps};
-use crate::run::model::Nonlinear;
+use crate::run::model::NonlinearModel;
 use crate::stability::period_map::{
     TurnRecorder, TurnSetup, lane_model, map_in_batches, step_grid,
 };
@@ -100,7 +100,7 @@ fn integrate_lanes<T: Lane>(
     let setups: Vec<TurnSetup<'_>> =
         held_states.iter().map(|held_state| held_state.setup).collect();
     let grid = step_grid(zero, &setups);
-    let model: Nonlinear<T> = lane_model(zero, &setups);
+    let model: NonlinearModel<T> = lane_model(zero, &setups);
     let mut states = [[zero; STATES]];
     for lane in 0..T::LANES {
         for i in 0..STATES {

@@ -272,8 +272,8 @@ impl<T: Lane> OutOfLine for OutputLinearisation<'_, T> {
                     MovingCoordinates { q: with_derivative(q, j, 1.0), u: zeros, a: zeros };
                 let axes = BodyAxes::new(&spin, &motion);
                 let channels = axes.channels(&dual_bodies, &motion);
-                let radial = axes.radial_position(&dual_bodies, &motion);
-                for (output, y) in channels.iter().chain(&radial).enumerate() {
+                let radial_position = axes.radial_position(&dual_bodies, &motion);
+                for (output, y) in channels.iter().chain(&radial_position).enumerate() {
                     samples[k][output][REST_COLUMN] = N(y.value.0.value);
                     samples[k][output][j] = N(y.value.0.slope);
                 }

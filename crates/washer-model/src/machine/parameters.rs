@@ -49,8 +49,8 @@ pub enum Target {
     Dampers(&'static str),
     /// A number of the spin's profile, or of a point of the spin's table.
     Spin,
-    /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
-    /// [`MachineParameter::get`] returns `None` and [`MachineParameter::set`] does nothing.
+    /// An edge of the window (0: the beginning, 1: the end). Neither machine nor spin has a field
+    /// for it: [`MachineParameter::get`] returns `None` and [`MachineParameter::set`] does nothing.
     Window(usize),
 }
 
@@ -192,8 +192,10 @@ impl MachineParameter {
                             _ => ("the machine", list.element_name),
                         };
                         let last_number = list.first_number + count - 1;
-                        let element_count_text =
-                            format!("{owner} has {last_number} {}", plural(noun, last_number));
+                        let element_count_text = format!(
+                            "{owner} has {last_number} {}",
+                            noun_for_count(noun, last_number)
+                        );
                         Err(UnknownParameter::in_other_models(format!(
                             "{element_count_text}, numbered from 1"
                         )))
@@ -283,7 +285,7 @@ impl MachineParameter {
 }
 
 /// Returns a noun in the singular or the plural, by a count.
-fn plural(noun: &str, count: usize) -> String {
+fn noun_for_count(noun: &str, count: usize) -> String {
     match (noun, count) {
         (_, 1) => noun.to_owned(),
         ("foot", _) => "feet".to_owned(),

@@ -31,7 +31,7 @@ use crate::{COORDINATES, Channel, Machine, Matrices, Timing};
 const SWING_FACTOR: f64 = 2.0;
 
 /// The coordinates of the tub, and of the shaft in the same order.
-const RIGID_PAIRS: [[usize; 2]; 4] =
+const RIGID_COORDINATE_PAIRS: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
 /// The coordinates that deflect bearings and hinge while the tub stands still.
@@ -52,7 +52,7 @@ const ANGLES_RAD: [f64; 4] = [0.0, 0.5 * PI, PI, 1.5 * PI];
 struct FrontDeflection {
     drum_front_m: f64,
     tub_front_m: f64,
-    tub_rad: f64,
+    tub_angle_rad: f64,
 }
 
 impl FrontDeflection {
@@ -61,14 +61,14 @@ impl FrontDeflection {
         Self {
             drum_front_m: self.drum_front_m.max(other.drum_front_m),
             tub_front_m: self.tub_front_m.max(other.tub_front_m),
-            tub_rad: self.tub_rad.max(other.tub_rad),
+            tub_angle_rad: self.tub_angle_rad.max(other.tub_angle_rad),
         }
     }
 }
 
 /// The jumps of the drum's acceleration in a run.
 #[derive(Clone, Debug)]
-pub(crate) struct Jumps {
+pub(crate) struct AccelerationJumps {
     /// The jumps before the end of the window, by the time for which the drum stands after them.
     before_window_end: Vec<JumpGroup>,
     /// The sum of all jumps of the run (rad/s^2).
@@ -82,12 +82,12 @@ struct JumpGroup {
     standing_s: f64,
 }
 
-impl Jumps {
+impl AccelerationJumps {
     /// Finds the jumps of a spin in a run.
     pub(crate) fn new(spin_segments: &[SpinSegment], timing: &Timing) -> Self {
         let [window_start_s, window_end_s] = timing.window_s;
         let sizes_rad_per_s2 = jumps_rad_per_s2(spin_segments);
-        let mut groups: Vec<JumpGroup> = Vec::new();
+        let mut jump_groups: Vec<JumpGroup> = Vec::new();
         let mut sum_rad_per_s2 = 0.0;
         let mut standing_s = 0.0;
         let mut next_start_s = f64::INFINITY;
@@ -103,18 +103,19 @@ impl Jumps {
             if start_s >= window_end_s {
                 continue;
             }
-            match groups.last_mut().filter(|group| group.standing_s == standing_s) {
+            match jump_groups.last_mut().filter(|group| group.standing_s == standing_s) {
                 Some(group) => group.sum_rad_per_s2 += size_rad_per_s2,
-                None => groups.push(JumpGroup { sum_rad_per_s2: size_rad_per_s2, standing_s }),
+                None => jump_groups.push(JumpGroup { sum_rad_per_s2: size_rad_per_s2, standing_s }),
             }
         }
-        Self { before_window_end: groups, sum_rad_per_s2 }
+        Self { before_window_end: jump_groups, sum_rad_per_s2 }
     }
 
     /// Whether the drum stands after a jump and before the window.
     fn is_any_before_standstill(&self) -> bool {
-        let is_before = |group: &JumpGroup| group.standing_s > 0.0 && group.sum_rad_per_s2 > 0.0;
-        self.before_window_end.iter().any(is_before)
+        let is_before_standstill =
+            |group: &JumpGroup| group.standing_s > 0.0 && group.sum_rad_per_s2 > 0.0;
+        self.before_window_end.iter().any(is_before_standstill)
     }
 
     /// Returns the sum of the jumps before the window's end (rad/s^2), each reduced by the decay of
@@ -129,7 +130,7 @@ impl Jumps {
 /// The greatest deflections under all jumps of the drum's acceleration.
 #[derive(Clone, Debug)]
 pub(crate) struct Ringing {
-    jumps: Arc<Jumps>,
+    jumps: Arc<AccelerationJumps>,
     /// The rate at which the swing decays while the drum stands (1/s).
     decay_per_s: f64,
     /// The deflections by a jump of [`UNIT_JUMP_RAD_PER_S2`].
@@ -140,15 +141,15 @@ pub(crate) struct Ringing {
 /// Returns the jump of the drum's acceleration at the start of each segment of the spin (rad/s^2).
 fn jumps_rad_per_s2(spin_segments: &[SpinSegment]) -> Vec<f64> {
     let mut previous_rad_per_s2 = 0.0;
-    let mut jumps = Vec::with_capacity(spin_segments.len());
+    let mut acceleration_jumps = Vec::with_capacity(spin_segments.len());
     for (i, spin_segment) in spin_segments.iter().enumerate() {
         let start_rad_per_s2 = spin_segment.acceleration_rad_per_s2(spin_segment.start_s.0);
-        jumps.push((start_rad_per_s2 - previous_rad_per_s2).abs());
+        acceleration_jumps.push((start_rad_per_s2 - previous_rad_per_s2).abs());
         if let Some(next) = spin_segments.get(i + 1) {
             previous_rad_per_s2 = spin_segment.acceleration_rad_per_s2(next.start_s.0);
         }
     }
-    jumps
+    acceleration_jumps
 }
 
 /// The modes that a step does not resolve, because it is longer than their periods.
@@ -175,7 +176,7 @@ impl Ringing {
     /// (rad/s^2) of the drum at rest.
     pub(crate) fn new(
         machine: &Machine,
-        jumps: Arc<Jumps>,
+        jumps: Arc<AccelerationJumps>,
         matrices_at: impl Fn(f64, f64) -> Matrices,
     ) -> Self {
         let mut ringing = Self {
@@ -185,23 +186,27 @@ impl Ringing {
             hinge_and_bearings_deflection: FrontDeflection::default(),
         };
         for angle_rad in ANGLES_RAD {
-            let at_rest = matrices_at(angle_rad, 0.0);
-            let during_jump = matrices_at(angle_rad, UNIT_JUMP_RAD_PER_S2);
+            let rest_matrices = matrices_at(angle_rad, 0.0);
+            let jump_matrices = matrices_at(angle_rad, UNIT_JUMP_RAD_PER_S2);
             let load: [f64; COORDINATES] =
-                core::array::from_fn(|i| during_jump.force[i] - at_rest.force[i]);
+                core::array::from_fn(|i| jump_matrices.force[i] - rest_matrices.force[i]);
             // The system has no solution if bearings or hinge have no stiffness; no level is stable
             // for such a machine.
-            let Some(free_machine) = FreeMachine::new(&at_rest) else { continue };
-            let Some(elastic_deflection) = free_machine.static_deflection(&load) else { continue };
+            let Some(unsuspended_machine) = UnsuspendedMachine::new(&rest_matrices) else {
+                continue;
+            };
+            let Some(elastic_deflection) = unsuspended_machine.static_deflection(&load) else {
+                continue;
+            };
             let mut bearings_deflection = elastic_deflection;
             bearings_deflection[HINGE_YAW] = 0.0;
             bearings_deflection[HINGE_PITCH] = 0.0;
             ringing.bearings_deflection = ringing
                 .bearings_deflection
-                .max(free_machine.deflection(machine, &bearings_deflection));
+                .max(unsuspended_machine.front_deflection(machine, &bearings_deflection));
             ringing.hinge_and_bearings_deflection = ringing
                 .hinge_and_bearings_deflection
-                .max(free_machine.deflection(machine, &elastic_deflection));
+                .max(unsuspended_machine.front_deflection(machine, &elastic_deflection));
         }
         ringing
     }
@@ -218,8 +223,8 @@ impl Ringing {
 
     /// Returns the greatest swing of each channel in the window and of the gap in the whole run, by
     /// the modes that are not resolved.
-    pub(crate) fn swing(&self, unresolved: UnresolvedModes) -> Swing {
-        let deflection = match unresolved {
+    pub(crate) fn swing(&self, unresolved_modes: UnresolvedModes) -> Swing {
+        let deflection = match unresolved_modes {
             UnresolvedModes::HingeAndBearings => self.hinge_and_bearings_deflection,
             UnresolvedModes::Bearings => self.bearings_deflection,
         };
@@ -231,7 +236,7 @@ impl Ringing {
                 * match channel.kind() {
                     ChannelKind::DrumPoint => deflection.drum_front_m,
                     ChannelKind::TubPoint => deflection.tub_front_m,
-                    ChannelKind::TubAngle => deflection.tub_rad,
+                    ChannelKind::TubAngle => deflection.tub_angle_rad,
                 }
         });
         let gap_m = run_factor * (deflection.drum_front_m + deflection.tub_front_m);
@@ -241,23 +246,24 @@ impl Ringing {
 
 /// The linear model of the machine without its suspension, which moves as a rigid body and deflects
 /// bearings and hinge.
-struct FreeMachine<'a> {
+struct UnsuspendedMachine<'a> {
     matrices: &'a Matrices,
     /// The factors of the rigid body's mass matrix S' M S, with the sums S over the coordinates
     /// of tub and shaft.
-    rigid_mass: Lu<4>,
+    rigid_mass_factors: Lu<4>,
 }
 
-impl<'a> FreeMachine<'a> {
+impl<'a> UnsuspendedMachine<'a> {
     /// Creates the free machine; `None` if it has no mass.
     fn new(matrices: &'a Matrices) -> Option<Self> {
-        let rigid_mass = RIGID_PAIRS.map(|row| {
-            RIGID_PAIRS.map(|column| {
-                let sum = |i: usize| matrices.mass[i][column[0]] + matrices.mass[i][column[1]];
-                N(sum(row[0]) + sum(row[1]))
+        let rigid_mass_factors = RIGID_COORDINATE_PAIRS.map(|row| {
+            RIGID_COORDINATE_PAIRS.map(|column| {
+                let column_pair_sum =
+                    |i: usize| matrices.mass[i][column[0]] + matrices.mass[i][column[1]];
+                N(column_pair_sum(row[0]) + column_pair_sum(row[1]))
             })
         });
-        Some(Self { matrices, rigid_mass: Lu::new(rigid_mass)? })
+        Some(Self { matrices, rigid_mass_factors: Lu::new(rigid_mass_factors)? })
     }
 
     /// Returns the product of the mass matrix and a vector of coordinates.
@@ -269,10 +275,10 @@ impl<'a> FreeMachine<'a> {
 
     /// Returns the rigid-body acceleration a under a load f: (S' M S) a = S' f.
     fn rigid_motion(&self, load: &[f64; COORDINATES]) -> [f64; COORDINATES] {
-        let force = RIGID_PAIRS.map(|[tub, shaft]| N(load[tub] + load[shaft]));
-        let accelerations = self.rigid_mass.solve(&force);
+        let rigid_force = RIGID_COORDINATE_PAIRS.map(|[tub, shaft]| N(load[tub] + load[shaft]));
+        let accelerations = self.rigid_mass_factors.solve(&rigid_force);
         let mut rigid_acceleration = [0.0; COORDINATES];
-        for ([tub, shaft], acceleration) in RIGID_PAIRS.into_iter().zip(accelerations) {
+        for ([tub, shaft], acceleration) in RIGID_COORDINATE_PAIRS.into_iter().zip(accelerations) {
             rigid_acceleration[tub] = acceleration.0;
             rigid_acceleration[shaft] = acceleration.0;
         }
@@ -286,9 +292,9 @@ impl<'a> FreeMachine<'a> {
         let stiffness = ELASTIC_COORDINATES
             .map(|i| ELASTIC_COORDINATES.map(|j| N(self.matrices.stiffness[i][j])));
         let relieved_load = ELASTIC_COORDINATES.map(|i| N(load[i] - inertia_load[i]));
-        let solution = Lu::new(stiffness)?.solve(&relieved_load);
+        let elastic_solution = Lu::new(stiffness)?.solve(&relieved_load);
         let mut deflection = [0.0; COORDINATES];
-        for (i, value) in ELASTIC_COORDINATES.into_iter().zip(solution) {
+        for (i, value) in ELASTIC_COORDINATES.into_iter().zip(elastic_solution) {
             deflection[i] = value.0;
         }
         Some(deflection)
@@ -297,7 +303,7 @@ impl<'a> FreeMachine<'a> {
     /// Returns the deflections of the free machine if bearings and hinge deflect by
     /// `elastic_deflection`. The tub moves in the opposite direction, so that momentum is
     /// conserved.
-    fn deflection(
+    fn front_deflection(
         &self,
         machine: &Machine,
         elastic_deflection: &[f64; COORDINATES],
@@ -305,7 +311,7 @@ impl<'a> FreeMachine<'a> {
         let rigid_acceleration = self.rigid_motion(&self.multiply_mass(elastic_deflection));
         let drum = &machine.drum;
         let tub_m = rigid_acceleration[TUB_Y].hypot(rigid_acceleration[TUB_Z]);
-        let tub_rad = rigid_acceleration[TUB_YAW].hypot(rigid_acceleration[TUB_PITCH]);
+        let tub_angle_rad = rigid_acceleration[TUB_YAW].hypot(rigid_acceleration[TUB_PITCH]);
         let bearings_m = elastic_deflection[SHAFT_Y].hypot(elastic_deflection[SHAFT_Z]);
         let bearings_rad = elastic_deflection[SHAFT_YAW].hypot(elastic_deflection[SHAFT_PITCH]);
         let hinge_rad = elastic_deflection[HINGE_YAW].hypot(elastic_deflection[HINGE_PITCH]);
@@ -313,9 +319,9 @@ impl<'a> FreeMachine<'a> {
             + drum.front_x_m.abs() * bearings_rad
             + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;
         FrontDeflection {
-            drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_rad,
-            tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_rad,
-            tub_rad,
+            drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_angle_rad,
+            tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_angle_rad,
+            tub_angle_rad,
         }
     }
 }

@@ -148,7 +148,7 @@ pub(crate) struct ObservedState<'a, T: Lane> {
     pub(crate) step: Option<(N<T>, N<T>)>,
     pub(crate) x: &'a [N<T>; STATES],
     pub(crate) dx: &'a [N<T>; STATES],
-    pub(crate) radial: &'a [Sample<T>; RADIAL_COMPONENTS],
+    pub(crate) radial_position: &'a [Sample<T>; RADIAL_COMPONENTS],
     pub(crate) channels: &'a [Sample<T>; CHANNELS],
     /// The lanes that are inside their windows.
     pub(crate) lanes_in_window: T::Mask,
@@ -159,8 +159,15 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { recorders: active_recorders, step, x, dx, radial, channels, lanes_in_window } =
-            self;
+        let Self {
+            recorders: active_recorders,
+            step,
+            x,
+            dx,
+            radial_position,
+            channels,
+            lanes_in_window,
+        } = self;
         let recorders = active_recorders.recorders;
         if recorders.root_mean_squares {
             match step {
@@ -187,7 +194,7 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
         if recorders.has_gauge(Gauge::ClashTime) {
             // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
-            let mut squared_overlap = squared_distance(radial);
+            let mut squared_overlap = squared_distance(radial_position);
             squared_overlap.value -= active_recorders.clearance_squared;
             match step {
                 Some((_, length_s)) => {

@@ -5,7 +5,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::{SpinSegment, segment_index};
 use crate::nonlinear::coupling::Coupling;
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, N, OutOfLine, Partials, Simd};
 use std::sync::Arc;
@@ -31,8 +31,8 @@ struct DifferentiableModel<M, J> {
 
 /// The nonlinear or the linear model.
 enum EitherModel {
-    Nonlinear(Box<DifferentiableModel<Nonlinear<f64>, Nonlinear<Dual<f64>>>>),
-    Linear(Box<DifferentiableModel<Linear<f64>, Linear<Dual<f64>>>>),
+    Nonlinear(Box<DifferentiableModel<NonlinearModel<f64>, NonlinearModel<Dual<f64>>>>),
+    Linear(Box<DifferentiableModel<LinearModel<f64>, LinearModel<Dual<f64>>>>),
 }
 
 impl PointEquations {
@@ -41,11 +41,11 @@ impl PointEquations {
         let (model, rest_state) = match model {
             ModelKind::Nonlinear => (
                 EitherModel::Nonlinear(DifferentiableModel::new(point)),
-                <Nonlinear<f64> as LaneModel<f64>>::rest_state(point),
+                <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point),
             ),
             ModelKind::Linear => (
                 EitherModel::Linear(DifferentiableModel::new(point)),
-                <Linear<f64> as LaneModel<f64>>::rest_state(point),
+                <LinearModel<f64> as LaneModel<f64>>::rest_state(point),
             ),
         };
         Self {

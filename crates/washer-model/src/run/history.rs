@@ -16,7 +16,7 @@ use crate::run::method::{
     LinearFamily, ModelFamily, NonlinearFamily, Rk4Stepper, Stepper, StepperVisitor,
     coupling_for_method, start_segment,
 };
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use crate::run::snapshots::position_in_step;
 use crate::run::suspension::compute_forces;
 use crate::{COORDINATES, Method, MethodKind, ModelKind, Point, SuspensionForces};
@@ -189,8 +189,10 @@ impl<'a> History<'a> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
-            ModelKind::Nonlinear => compute_outputs::<Nonlinear<f64>>(self.point, time_s, state),
-            ModelKind::Linear => compute_outputs::<Linear<f64>>(self.point, time_s, state),
+            ModelKind::Nonlinear => {
+                compute_outputs::<NonlinearModel<f64>>(self.point, time_s, state)
+            }
+            ModelKind::Linear => compute_outputs::<LinearModel<f64>>(self.point, time_s, state),
         };
         let mut deviations: [f64; COORDINATES] = core::array::from_fn(|i| state[i]);
         if self.model == ModelKind::Nonlinear {
@@ -224,8 +226,9 @@ fn compute_outputs<M: LaneModel<f64>>(
     let forcing = model.forcing(N(time_s));
     let state = state.map(N);
     let derivative = model.derivative(&forcing, &state);
-    let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
-    let gap_m = point.machine.bodies.clearance.0 - squared_distance(&radial).value.0.sqrt();
+    let (radial_position, channels) = model.observe(&forcing, &state, &derivative, true);
+    let gap_m =
+        point.machine.bodies.clearance.0 - squared_distance(&radial_position).value.0.sqrt();
     let channels = channels.unwrap_or([Sample::constant(N(f64::NAN), N(f64::NAN)); CHANNELS]);
     let values = channels.map(|sample| sample.value.0);
     let rates = channels.map(|sample| sample.slope.0);

@@ -6,7 +6,7 @@
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
 use crate::point::PlannedSegment;
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use crate::{Caps, Formula, ModelKind, Point};
 use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dop853_adaptive, dopri5, rk4};
 
@@ -197,7 +197,7 @@ pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
     point: &Point,
     segment: &PlannedSegment,
 ) -> Segment {
-    model.set_spin(lane, &point.spin_segments[segment.spin_segment]);
+    model.set_spin(lane, &point.spin_segments[segment.spin_segment_index]);
     Segment { start_s: segment.start_s, end_s: segment.end_s, step_s: method.step_s }
 }
 
@@ -229,7 +229,7 @@ pub(crate) enum NonlinearFamily {}
 /// The linear model over any lanes.
 pub(crate) enum LinearFamily {}
 impl ModelFamily for NonlinearFamily {
-    type OnLanes<T: Lane> = Nonlinear<T>;
+    type OnLanes<T: Lane> = NonlinearModel<T>;
     type FixedStepStepper = Dop853Stepper;
     type AdaptiveStepper = Dop853AdaptiveStepper;
     const KIND: ModelKind = ModelKind::Nonlinear;
@@ -239,7 +239,7 @@ impl ModelFamily for NonlinearFamily {
     }
 }
 impl ModelFamily for LinearFamily {
-    type OnLanes<T: Lane> = Linear<T>;
+    type OnLanes<T: Lane> = LinearModel<T>;
     type FixedStepStepper = Rk4Stepper;
     type AdaptiveStepper = Dopri5Stepper;
     const KIND: ModelKind = ModelKind::Linear;

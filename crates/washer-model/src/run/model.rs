@@ -88,16 +88,16 @@ fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
 }
 
 /// The nonlinear model.
-pub(crate) struct Nonlinear<T> {
+pub(crate) struct NonlinearModel<T> {
     coupling: Coupling<T>,
     machine: MachineCoefficients<T>,
     spin: SpinSegmentLanes<T>,
     /// The channels at the static equilibrium.
-    channels_at_rest: [N<T>; CHANNELS],
+    channel_rest_values: [N<T>; CHANNELS],
     sag: Sag<T>,
 }
 
-impl<T: Lane> System<T, STATES> for Nonlinear<T> {
+impl<T: Lane> System<T, STATES> for NonlinearModel<T> {
     type Forcing = SpinState<T>;
 
     #[inline(always)]
@@ -119,7 +119,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
 }
 
 /// Requires that bearings and hinge are not capped.
-impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
+impl<T: Lane> SemiImplicit<T, STATES> for NonlinearModel<T> {
     #[inline(always)]
     fn solve_implicit_stage(
         &self,
@@ -133,7 +133,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     }
 }
 
-impl<T: Lane> Nonlinear<T> {
+impl<T: Lane> NonlinearModel<T> {
     /// Computes the motions on which forces with corners depend: depth (m) and speed (m/s) of each.
     #[inline(always)]
     pub(crate) fn corner_motions(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
@@ -157,21 +157,21 @@ impl<T: Lane> Nonlinear<T> {
     }
 }
 
-impl<T: Lane> LaneModel<T> for Nonlinear<T> {
+impl<T: Lane> LaneModel<T> for NonlinearModel<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
             coupling,
             machine: MachineCoefficients::splat(zero, &point.machine),
             spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
-            channels_at_rest: InLanes::splat(zero, &point.channels_at_rest.map(N)),
+            channel_rest_values: InLanes::splat(zero, &point.channel_rest_values.map(N)),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)),
         }
     }
 
     fn set_point(&mut self, lane: usize, point: &Point) {
         self.machine.set_lane(lane, &point.machine);
-        self.channels_at_rest.set_lane(lane, &point.channels_at_rest.map(N));
+        self.channel_rest_values.set_lane(lane, &point.channel_rest_values.map(N));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium));
     }
 
@@ -212,7 +212,7 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
         if with_channels {
             let mut samples = axes.channels(bodies, &motion);
             for i in 0..CHANNELS {
-                samples[i].value -= self.channels_at_rest[i];
+                samples[i].value -= self.channel_rest_values[i];
             }
             channels = Some(samples);
         }
@@ -221,7 +221,7 @@ impl<T: Lane> LaneModel<T> for Nonlinear<T> {
 }
 
 /// The linear model.
-pub(crate) struct Linear<T> {
+pub(crate) struct LinearModel<T> {
     coupling: Coupling<T>,
     flexure_stiffness: N<T>,
     constants: StepConstants<T>,
@@ -239,7 +239,7 @@ pub(crate) struct LinearForcing<T> {
     rotor: RotorArrays<T>,
 }
 
-impl<T: Lane> System<T, STATES> for Linear<T> {
+impl<T: Lane> System<T, STATES> for LinearModel<T> {
     type Forcing = LinearForcing<T>;
 
     #[inline(always)]
@@ -280,7 +280,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
 }
 
 /// Requires that bearings and hinge are not capped.
-impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
+impl<T: Lane> SemiImplicit<T, STATES> for LinearModel<T> {
     #[inline(always)]
     fn solve_implicit_stage(
         &self,
@@ -304,17 +304,20 @@ impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
 }
 
 fn step_constants(point: &Point) -> StepConstants<f64> {
-    StepConstants::new(&point.machine.bodies, &point.linear.constants)
+    StepConstants::new(&point.machine.bodies, &point.linear_coefficients.constants)
 }
 
-impl<T: Lane> LaneModel<T> for Linear<T> {
+impl<T: Lane> LaneModel<T> for LinearModel<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
             coupling,
             flexure_stiffness: zero.lit(point.machine.bodies.flexure_stiffness.0),
             constants: StepConstants::splat(zero, &step_constants(point)),
-            rotor_coefficients: RotorCoefficients::splat(zero, &point.linear.rotor_coefficients),
+            rotor_coefficients: RotorCoefficients::splat(
+                zero,
+                &point.linear_coefficients.rotor_coefficients,
+            ),
             sag: Sag::splat(zero, &Sag::new(&point.equilibrium)).hinge_angles,
             outputs: LinearOutputs::splat(zero, &point.linear_outputs),
             spin: SpinSegmentLanes::splat(zero, &point.spin_segments[0]),
@@ -325,7 +328,7 @@ impl<T: Lane> LaneModel<T> for Linear<T> {
         self.flexure_stiffness.set_lane(lane, &point.machine.bodies.flexure_stiffness);
         self.constants.set_lane(lane, &step_constants(point));
         self.sag.set_lane(lane, &Sag::new(&point.equilibrium).hinge_angles);
-        self.rotor_coefficients.set_lane(lane, &point.linear.rotor_coefficients);
+        self.rotor_coefficients.set_lane(lane, &point.linear_coefficients.rotor_coefficients);
         self.outputs.set_lane(lane, &point.linear_outputs);
     }
 

@@ -9,7 +9,7 @@ use crate::lanes::ToDual as _;
 use crate::machine::feet::LOAD_COMPONENTS;
 use crate::nonlinear::elements::{CabinetLine, ElementEnds, ForceLaw, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
-use crate::run::model::{LaneModel, Nonlinear};
+use crate::run::model::{LaneModel, NonlinearModel};
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Real};
 use std::borrow::Cow;
@@ -181,7 +181,7 @@ pub fn stop_forces_at_rest_n(point: &Point) -> Vec<f64> {
     compute_forces(
         point,
         ModelKind::Nonlinear,
-        &<Nonlinear<f64> as LaneModel<f64>>::rest_state(point),
+        &<NonlinearModel<f64> as LaneModel<f64>>::rest_state(point),
     )
     .stop_forces_n
 }

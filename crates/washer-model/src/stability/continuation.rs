@@ -757,13 +757,13 @@ impl<'a> PeriodMapSearch<'a> for ResponseCurve<'a> {
 mod tests {
     use super::*;
     use crate::Machine;
-    use crate::stability::tests::{idle_stop, prepared};
+    use crate::stability::tests::{idle_stop, prepare_at_speed};
 
     /// Returns the paper's machine, with a stop that has no force if `has_stop`.
     fn prepare_point(has_stop: bool) -> crate::Point {
         let mut machine = Machine::paper();
         machine.stops.extend(has_stop.then(idle_stop));
-        prepared(machine, 100.0)
+        prepare_at_speed(machine, 100.0)
     }
 
     /// Returns a curve through the given speeds (rpm) at an arclength of 1 from each other, with

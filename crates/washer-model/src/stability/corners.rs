@@ -9,7 +9,7 @@ use crate::coordinates::{COORDINATES, ROTOR_ROTATIONS, STATES, TUB_COORDINATES};
 use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::run::model::Nonlinear;
+use crate::run::model::NonlinearModel;
 use lane_ode::{Dual, Lane, N, OutOfLine};
 
 /// The derivative of every acceleration by each coordinate, then by each speed.
@@ -54,7 +54,7 @@ impl<T: Lane> CornerMotion<T> {
 
 /// The computation of the motions of all forces with corners at a state.
 pub(super) struct CornerMotionEvaluation<'a, T> {
-    pub(super) model: &'a Nonlinear<Dual<T>>,
+    pub(super) model: &'a NonlinearModel<Dual<T>>,
     pub(super) spin: &'a SpinState<Dual<T>>,
     pub(super) x: &'a [N<T>; STATES],
 }

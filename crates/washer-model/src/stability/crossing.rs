@@ -8,7 +8,7 @@ use crate::coordinates::{COORDINATES, STATES, mirror_state};
 use crate::machine::spin::{SpinSegment, segment_index};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
-use crate::run::model::{LaneModel, Nonlinear};
+use crate::run::model::{LaneModel, NonlinearModel};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
@@ -58,7 +58,7 @@ pub fn follow_crossings(
     step_s: f64,
     crossings: &[Crossing<'_>],
 ) -> Vec<Result<CrossingEffect, LeftRangeError>> {
-    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
+    let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point);
     let mut current_s = 0.0;
     let mut state = rest_state;
     let mut failure = None;
@@ -116,7 +116,7 @@ pub fn peaks_without_departures(
     crossings: &[Crossing<'_>],
     window_s: [f64; 2],
 ) -> Result<[f64; CHANNELS], LeftRangeError> {
-    let mut state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
+    let mut state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point);
     let mut time_s = 0.0;
     let mut peaks = [0.0_f64; CHANNELS];
     let mut integrate_to = |to_s: f64, state: &mut [f64; STATES]| {
@@ -232,7 +232,7 @@ impl OutOfLine for SequenceIntegration<'_> {
     #[inline(always)]
     fn run(self) -> RunResult {
         let zero = N(0.0);
-        let mut model: Nonlinear<f64> = LaneModel::splat(zero, self.point, Coupling::Springs);
+        let mut model: NonlinearModel<f64> = LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut x = [zero; STATES];
         for i in 0..STATES {
             x[i] = N(self.start_state[i]);
@@ -280,7 +280,7 @@ impl Kernel for TangentMap<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero).constant();
         let sequences = step_sequences(self.point, self.step_s, self.crossing.interval_s);
-        let mut model: Nonlinear<lane_ode::Dual<T>> =
+        let mut model: NonlinearModel<lane_ode::Dual<T>> =
             LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut columns = Vec::with_capacity(STATES);
         while columns.len() < STATES {

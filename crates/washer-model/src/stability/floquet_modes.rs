@@ -9,7 +9,7 @@ use super::{ResponseError, round_last_digits};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::{Mode, highest_frequency_rad_per_s, modes};
 use crate::point::Point;
-use crate::run::model::Linear;
+use crate::run::model::LinearModel;
 use core::f64::consts::TAU;
 use faer::{Mat, c64};
 use lane_ode::{Kernel, Lane, N, Simd};
@@ -165,7 +165,7 @@ impl Kernel for LinearMonodromy<'_> {
         let zero = N(zero);
         let setup = self.0;
         // Every lane has the same machine and one disturbance; the first group has no disturbance.
-        let model: Linear<T> = lane_model(zero, &[setup]);
+        let model: LinearModel<T> = lane_model(zero, &[setup]);
         let grid = StepGrid {
             step_s: zero.lit(setup.step_s()),
             step_count: setup.step_count,

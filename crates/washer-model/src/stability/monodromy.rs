@@ -12,7 +12,7 @@ use super::turn::{A, B, StepGrid};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::run::model::Nonlinear;
+use crate::run::model::NonlinearModel;
 use faer::Mat;
 use lane_ode::{Dual, Lane, MAX_LANES, N, OutOfLine, System, trig};
 
@@ -56,7 +56,7 @@ pub(super) struct SmoothMonodromy<'a, T> {
     /// The result of [`interpolation_weights`].
     pub(super) weights: &'a [Vec<f64>],
     /// The model. Lane k has turn k modulo `turn_count`.
-    pub(super) model: Nonlinear<Dual<T>>,
+    pub(super) model: NonlinearModel<Dual<T>>,
     pub(super) grid: StepGrid<T>,
     pub(super) turn_count: usize,
     /// The number of equally spaced instants of a turn at which derivatives are computed.
@@ -314,7 +314,7 @@ impl<T: Lane> SmoothMonodromy<'_, T> {
     fn compute_derivatives(
         &self,
         zero: N<T>,
-        forcing: &<Nonlinear<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
+        forcing: &<NonlinearModel<Dual<T>> as System<Dual<T>, STATES>>::Forcing,
         reference_state: &[N<T>; STATES],
         derivatives: &mut [[N<T>; STATES]; COORDINATES],
     ) {

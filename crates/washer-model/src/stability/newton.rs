@@ -318,13 +318,13 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
 mod tests {
     use super::*;
     use crate::stability::settings::Settings;
-    use crate::stability::tests::{machine_with, prepared};
+    use crate::stability::tests::{machine_with, prepare_at_speed};
 
     /// Checks that deflation reverses a step towards a known response, and does not change a step
     /// far from known responses.
     #[test]
     fn known_responses_repel() {
-        let point = prepared(machine_with(0.4, 140.0), 100.0);
+        let point = prepare_at_speed(machine_with(0.4, 140.0), 100.0);
         let setup = Settings::new(&point).held_case(250.0).unwrap().setup;
         let known_response = [0.0; STATES];
         // The ratio of the deflated step to Newton's, which leads to the known response.

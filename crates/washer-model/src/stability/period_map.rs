@@ -17,7 +17,7 @@ use crate::point::Point;
 use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, select_motion_speeds};
 use crate::run::active_recorders::{ActiveRecorders, ObservedState};
 use crate::run::all_lanes;
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use crate::run::suspension::damper_speeds_m_per_s;
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -244,7 +244,7 @@ fn integrate_batch<T: Lane>(
 ) {
     let setups: Vec<TurnSetup<'_>> = requests.iter().map(|request| request.setup).collect();
     let grid = step_grid(zero, &setups);
-    let model: Nonlinear<T> = lane_model(zero, &setups);
+    let model: NonlinearModel<T> = lane_model(zero, &setups);
     let mut end_states = [[zero; STATES]];
     for lane in 0..T::LANES {
         for i in 0..STATES {
@@ -420,7 +420,7 @@ fn solve_linear_batch<T: Lane>(
     responses: &mut Vec<LinearResponse>,
 ) {
     let grid = step_grid(zero, setups);
-    let model: Linear<T> = lane_model(zero, setups);
+    let model: LinearModel<T> = lane_model(zero, setups);
     // The first turn starts from rest, the others from a unit of each coordinate and speed.
     let mut end_states = vec![[zero; STATES]; 1 + STATES];
     for j in 0..STATES {
@@ -555,14 +555,14 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
             self.last_sample = [*x, *dx];
         }
         let all_lanes_mask = all_lanes(x[0]);
-        if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
+        if let (radial_position, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
                 self.peaks.begin(&channels, all_lanes_mask);
             } else {
                 self.peaks.advance(self.grid.step_s, &channels, all_lanes_mask);
             }
             if let Some(further_recorders) = &mut self.further_recorders {
-                let radial = &radial;
+                let radial_position = &radial_position;
                 let channels = &channels;
                 let step = if k == 0 {
                     None
@@ -574,13 +574,13 @@ impl<'m, T: Lane, M: LaneModel<T>> StepObserver<T, M> for TurnRecorder<'m, T, M>
                     step,
                     x,
                     dx,
-                    radial,
+                    radial_position,
                     channels,
                     lanes_in_window: all_lanes_mask,
                 });
             }
             let max_squared = self.max_radial_squared.0;
-            let radial_squared = squared_distance(&radial).value.0;
+            let radial_squared = squared_distance(&radial_position).value.0;
             self.max_radial_squared =
                 N(T::select(max_squared.less(radial_squared), radial_squared, max_squared));
         }

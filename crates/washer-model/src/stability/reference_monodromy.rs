@@ -6,7 +6,7 @@ use super::period_map::{TurnSetup, lane_model};
 use super::turn::{NoObserver, StepGrid, StepObserver, integrate_turn};
 use crate::coordinates::STATES;
 use crate::modes::{ModesError, highest_frequency_rad_per_s};
-use crate::run::model::Nonlinear;
+use crate::run::model::NonlinearModel;
 use core::f64::consts::TAU;
 use lane_ode::{Dual, Lu, N, OutOfLine, System as _};
 
@@ -49,7 +49,7 @@ impl OutOfLine for ReferenceMonodromy<'_> {
     #[inline(always)]
     fn run(self) -> Option<StateMatrix> {
         let zero = N(0.0).constant();
-        let tangent_model: Nonlinear<Dual<f64>> = lane_model(zero, &[self.setup]);
+        let tangent_model: NonlinearModel<Dual<f64>> = lane_model(zero, &[self.setup]);
         let grid = StepGrid {
             step_s: zero.lit(self.setup.step_s()),
             step_count: self.setup.step_count,
@@ -118,17 +118,17 @@ pub(super) struct TraceIntegral<'a> {
 }
 
 struct TraceObserver<'m> {
-    model: &'m Nonlinear<Dual<f64>>,
+    model: &'m NonlinearModel<Dual<f64>>,
     step_s: f64,
     step_count: usize,
     integral: f64,
 }
 
-impl StepObserver<Dual<f64>, Nonlinear<Dual<f64>>> for TraceObserver<'_> {
+impl StepObserver<Dual<f64>, NonlinearModel<Dual<f64>>> for TraceObserver<'_> {
     fn observe(
         &mut self,
         k: usize,
-        forcing: &<Nonlinear<Dual<f64>> as lane_ode::System<Dual<f64>, STATES>>::Forcing,
+        forcing: &<NonlinearModel<Dual<f64>> as lane_ode::System<Dual<f64>, STATES>>::Forcing,
         x: &[N<Dual<f64>>; STATES],
         _: &[N<Dual<f64>>; STATES],
     ) {
@@ -149,7 +149,7 @@ impl OutOfLine for TraceIntegral<'_> {
     #[inline(always)]
     fn run(self) -> f64 {
         let zero = N(0.0).constant();
-        let model: Nonlinear<Dual<f64>> = lane_model(zero, &[self.setup]);
+        let model: NonlinearModel<Dual<f64>> = lane_model(zero, &[self.setup]);
         let step_s = self.setup.step_s();
         let step_count = self.setup.step_count;
         let grid = StepGrid { step_s: zero.lit(step_s), step_count, hinge_damping_factor: None };

@@ -14,7 +14,7 @@ use super::{GeometryLimit, HeldSpeed, Response, ResponseError, StabilityKind, ro
 use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::modes;
 use crate::point::Point;
-use crate::run::model::{LaneModel, Nonlinear};
+use crate::run::model::{LaneModel, NonlinearModel};
 use crate::run::suspension::attachment_vectors;
 use crate::steps::SUSPENSION_MODES;
 use core::f64::consts::TAU;
@@ -611,7 +611,7 @@ fn find_changed_by_caps(
 
 /// Returns the linear model's response as a guess, or the machine at rest if there is none.
 fn guess_from_linear(point: &Point, linear_response: &LinearResponse) -> Guess {
-    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(point);
+    let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point);
     let has_response = linear_response.state.iter().all(|x| x.is_finite());
     let deviation = |i: usize| if has_response { linear_response.state[i] } else { 0.0 };
     let state = core::array::from_fn(|i| rest_state[i] + deviation(i));
@@ -725,13 +725,13 @@ fn exceeded_limit(point: &Point, record: &OrbitRecord) -> Option<GeometryLimit> 
 mod tests {
     use super::*;
     use crate::channel::CHANNELS;
-    use crate::stability::tests::{machine_with, prepared};
+    use crate::stability::tests::{machine_with, prepare_at_speed};
 
     /// Replaces each of the three responses of the paper's machine with little damping at 255 rpm
     /// by a failed search, or by another response, and checks that it is found again.
     #[test]
     fn a_branch_that_was_lost_is_found_again() {
-        let point = prepared(machine_with(0.3, 30.0), 100.0);
+        let point = prepare_at_speed(machine_with(0.3, 30.0), 100.0);
         let mut curves =
             ResponseCurves::continue_curves(&[(&point, 255.0)], None, Cancel::Never).remove(0);
         let held_case = curves.upward_curve.settings.held_case(255.0).unwrap();

@@ -7,14 +7,14 @@
 use super::monodromy::StateMatrix;
 use super::turn::{NoObserver, StepGrid, integrate_turn};
 use crate::coordinates::STATES;
-use crate::run::model::Nonlinear;
+use crate::run::model::NonlinearModel;
 use lane_ode::{Dual, Lane, N, OutOfLine};
 
 /// The computation of the monodromy matrix of a discrete turn. Lanes hold its columns.
 pub(super) struct StepwiseMonodromy<T> {
     pub(super) zero: N<T>,
     /// The model and the steps, the same in every lane.
-    pub(super) model: Nonlinear<Dual<T>>,
+    pub(super) model: NonlinearModel<Dual<T>>,
     pub(super) grid: StepGrid<Dual<T>>,
     pub(super) start_state: [f64; STATES],
 }
@@ -45,7 +45,7 @@ impl<T: Lane> OutOfLine for StepwiseMonodromy<T> {
 
 #[cfg(test)]
 mod tests {
-    use crate::stability::tests::{idle_stop, machine_with, prepared};
+    use crate::stability::tests::{idle_stop, machine_with, prepare_at_speed};
     use crate::{HeldSpeed, Machine, Point, find_responses};
 
     /// Returns the paper's machine with 0.3 kg on dampers of 30 N s/m, whose curve of responses has
@@ -53,7 +53,7 @@ mod tests {
     fn folding_machine(change: impl Fn(&mut Machine)) -> Point {
         let mut machine = machine_with(0.3, 30.0);
         change(&mut machine);
-        prepared(machine, 100.0)
+        prepare_at_speed(machine, 100.0)
     }
 
     #[test]

@@ -22,13 +22,13 @@ use std::f64::consts::PI;
 
 const TIMING: Timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
 
-pub(super) fn prepared(machine: Machine, speed_rpm: f64) -> Point {
+pub(super) fn prepare_at_speed(machine: Machine, speed_rpm: f64) -> Point {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
     prepare(Simd::widest(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
 fn machine_of_case(case: &Value) -> Machine {
-    machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"))
+    machine_with(read_number(case, "unbalance_mass_kg"), read_number(case, "damping_n_s_per_m"))
 }
 
 pub(super) fn machine_with(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
@@ -50,17 +50,17 @@ pub(super) fn idle_stop() -> BumpStop {
     }
 }
 
-fn number(case: &Value, name: &str) -> f64 {
+fn read_number(case: &Value, name: &str) -> f64 {
     case[name].as_f64().unwrap()
 }
 
-fn reference_list(name: &str) -> Vec<Value> {
+fn read_reference_list(name: &str) -> Vec<Value> {
     read_reference("stability.json")[name].as_array().unwrap().clone()
 }
 
 /// Returns the first response of a machine at each speed.
 fn responses_of_machine(machine: Machine, speeds_rpm: &[f64]) -> Vec<Response> {
-    responses_of_point(&prepared(machine, 100.0), speeds_rpm)
+    responses_of_point(&prepare_at_speed(machine, 100.0), speeds_rpm)
 }
 
 fn responses_of_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
@@ -80,7 +80,7 @@ fn response_at(machine: Machine, speed_rpm: f64) -> Response {
 
 /// Returns the multipliers of the machine without caps, by plain Runge-Kutta, the largest first.
 fn reference_multipliers(machine: Machine, speed_rpm: f64, start_state: [f64; STATES]) -> Vec<c64> {
-    let point = prepared(machine, speed_rpm);
+    let point = prepare_at_speed(machine, speed_rpm);
     let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
     let matrix =
         Simd::one_lane(ReferenceMonodromy::new(&setup, start_state, 1e4).unwrap()).unwrap();
@@ -96,45 +96,49 @@ fn find_response(setup: &TurnSetup<'_>, start_state: [f64; STATES]) -> ([f64; ST
     assert!(run_searches(&mut searches, Cancel::Never));
     let [search] = searches;
     let (start_state, record) = search.into_response().unwrap();
-    let unit = |i: usize| if i < COORDINATES { 1.0 } else { setup.unit_per_s() };
-    let matrix = Mat::from_fn(STATES, STATES, |i, j| record.monodromy[i][j].0 * unit(j) / unit(i));
+    let component_unit = |i: usize| if i < COORDINATES { 1.0 } else { setup.unit_per_s() };
+    let matrix = Mat::from_fn(STATES, STATES, |i, j| {
+        record.monodromy[i][j].0 * component_unit(j) / component_unit(i)
+    });
     (start_state, matrix.eigenvalues().unwrap())
 }
 
 #[test]
 fn val_growth_and_amplitudes_match_an_independent_program() {
-    for case in reference_list("points") {
-        let computed = response_at(machine_of_case(&case), number(&case, "speed_rpm"));
-        let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
+    for case in read_reference_list("points") {
+        let computed_response =
+            response_at(machine_of_case(&case), read_number(&case, "speed_rpm"));
+        let [growth, frequency] =
+            ["growth_per_s", "frequency_cpm"].map(|name| read_number(&case, name));
         // If all disturbances decay, the slowest is that of the hinge, which is not compared.
         if growth > 0.0 {
-            let difference = computed.growth_per_s() - growth;
+            let difference = computed_response.growth_per_s() - growth;
             assert!(difference.abs() < 1e-3, "{case}: {difference:e}");
-            let difference = computed.frequency_cpm() - frequency;
+            let difference = computed_response.frequency_cpm() - frequency;
             assert!(difference.abs() < 1e-2, "{case}: {difference:e}");
         }
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
-            let error = computed.nonlinear_peaks[channel] / number(&case, name) - 1.0;
-            println!("{name} {error:e} growth {:e}", computed.growth_per_s() - growth);
+            let error = computed_response.nonlinear_peaks[channel] / read_number(&case, name) - 1.0;
+            println!("{name} {error:e} growth {:e}", computed_response.growth_per_s() - growth);
             // The reference takes the largest value at the ends of its steps, 1e-4 s apart, and
             // thereby misses up to this share of a peak.
-            let between_steps = 0.5 * (PI * 1e-4 * computed.speed_rpm / 60.0).powi(2);
+            let between_steps = 0.5 * (PI * 1e-4 * computed_response.speed_rpm / 60.0).powi(2);
             assert!(-1e-5 < error && error < 1e-5 + between_steps, "{case}: {error:e}");
         }
-        let kind = match (growth > 0.0, number(&case, "frequency_cpm")) {
+        let expected_kind = match (growth > 0.0, read_number(&case, "frequency_cpm")) {
             (false, _) => StabilityKind::Stable,
-            (true, frequency) if 2.0 * frequency == computed.speed_rpm => {
+            (true, frequency) if 2.0 * frequency == computed_response.speed_rpm => {
                 StabilityKind::PeriodDoubling
             }
             (true, _) => StabilityKind::QuasiPeriodic,
         };
-        assert_eq!(computed.kind(), kind, "{case}");
+        assert_eq!(computed_response.kind(), expected_kind, "{case}");
     }
 }
 
 #[test]
 fn val_edges_match_an_independent_program() {
-    for case in reference_list("edges") {
+    for case in read_reference_list("edges") {
         let boundaries_rpm: Vec<f64> =
             case["edges_rpm"].as_array().unwrap().iter().map(|e| e.as_f64().unwrap()).collect();
         let test_speeds_rpm: Vec<f64> = boundaries_rpm
@@ -151,14 +155,14 @@ fn val_edges_match_an_independent_program() {
 
 #[test]
 fn val_the_damping_that_closes_a_tongue_matches_an_independent_program() {
-    for case in reference_list("critical") {
+    for case in read_reference_list("critical") {
         let first_speed_rpm = if case["tongue"] == "f1+f2" { 245.0 } else { 302.0 };
-        let speeds: Vec<f64> = (0..40).map(|k| first_speed_rpm + 0.25 * f64::from(k)).collect();
+        let speeds_rpm: Vec<f64> = (0..40).map(|k| first_speed_rpm + 0.25 * f64::from(k)).collect();
         let max_growth = |difference: f64| {
-            let damping = number(&case, "damping_n_s_per_m") + difference;
+            let damping = read_number(&case, "damping_n_s_per_m") + difference;
             let responses = responses_of_machine(
-                machine_with(number(&case, "unbalance_mass_kg"), damping),
-                &speeds,
+                machine_with(read_number(&case, "unbalance_mass_kg"), damping),
+                &speeds_rpm,
             );
             responses.iter().map(Response::growth_per_s).fold(f64::NEG_INFINITY, f64::max)
         };
@@ -177,16 +181,16 @@ fn multipliers_are_those_of_the_machine_without_caps() {
         (machine_with(1.0, 250.0), 303.0),
         (machine_with(0.4, 140.0), 1200.0),
     ] {
-        let computed = response_at(machine.clone(), speed_rpm);
-        let expected = reference_multipliers(machine, speed_rpm, computed.start_state);
-        let mu = c64::new(computed.multiplier[0], computed.multiplier[1]);
+        let computed_response = response_at(machine.clone(), speed_rpm);
+        let expected = reference_multipliers(machine, speed_rpm, computed_response.start_state);
+        let mu = c64::new(computed_response.multiplier[0], computed_response.multiplier[1]);
         let nearest = expected
             .iter()
             .min_by(|a, b| (**a - mu).norm().total_cmp(&(**b - mu).norm()))
             .map(|mu| growth_per_s([mu.re, mu.im], speed_rpm))
             .unwrap();
-        let difference = computed.growth_per_s() - nearest;
-        println!("{speed_rpm}: {} {difference:e}", computed.growth_per_s());
+        let difference = computed_response.growth_per_s() - nearest;
+        println!("{speed_rpm}: {} {difference:e}", computed_response.growth_per_s());
         assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
         // No other disturbance grows; the hinge's disturbances decay slowly.
         for other in expected.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
@@ -202,7 +206,7 @@ fn multipliers_are_those_of_the_machine_without_caps() {
 #[test]
 fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
     let growth_at = |stiffness_n_per_m: f64| {
-        let mut machine = crate::tests::friction::machine(0.4, [40.0, 40.0], None);
+        let mut machine = crate::tests::friction::machine_with_friction(0.4, [40.0, 40.0], None);
         machine.bearings.front_stiffness_n_per_m = stiffness_n_per_m;
         machine.bearings.rear_stiffness_n_per_m = stiffness_n_per_m;
         response_at(machine, 420.0).growth_per_s()
@@ -221,9 +225,13 @@ fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
 
 /// Returns the changes of the coordinates from turn to turn after a small disturbance of a
 /// response. The response itself cancels in these differences.
-fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
+fn simulate_turn_changes(
+    machine: Machine,
+    response: &Response,
+    end_s: f64,
+) -> Vec<[f64; COORDINATES]> {
     let speed_rpm = response.speed_rpm;
-    let point = prepared(machine, speed_rpm);
+    let point = prepare_at_speed(machine, speed_rpm);
     let step_s = if point.machine.elements.has_nonsmooth_force() { 5e-5 } else { 2e-4 };
     let mut initial_deviation = InitialDeviation::default();
     for i in 0..COORDINATES {
@@ -244,11 +252,11 @@ fn simulated_moves(machine: Machine, response: &Response, end_s: f64) -> Vec<[f6
 }
 
 /// Returns the growth (1/s) of a small disturbance of a response in a simulation.
-fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
+fn simulate_growth_per_s(machine: Machine, response: &Response) -> f64 {
     // The disturbance grows by a factor of a thousand at most, so that it stays small.
-    let moves = simulated_moves(machine, response, 7.0 / response.growth_per_s());
+    let turn_changes = simulate_turn_changes(machine, response, 7.0 / response.growth_per_s());
     let turns_per_s = response.speed_rpm / 60.0;
-    largest_multiplier(&moves).ln() * turns_per_s
+    largest_multiplier(&turn_changes).ln() * turns_per_s
 }
 
 /// Returns the magnitude of the largest multiplier of changes from turn to turn.
@@ -258,25 +266,25 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
 /// linear combination of the n changes before it. Least squares give the coefficients, and the
 /// multipliers are the eigenvalues of the companion matrix. With too large an n the equations are
 /// singular; therefore n is increased only if the residual is too large.
-fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
+fn largest_multiplier(turn_changes: &[[f64; COORDINATES]]) -> f64 {
     /// The greatest relative residuals with which one multiplier, or a pair, is accepted.
     const MAX_RESIDUALS: [f64; 2] = [1e-6, 1e-2];
-    let late_moves = &moves[moves.len().div_ceil(2)..];
+    let late_changes = &turn_changes[turn_changes.len().div_ceil(2)..];
     let fit_multipliers = |count: usize| {
         use faer::linalg::solvers::SolveLstsq as _;
-        let rows = (late_moves.len() - count) * COORDINATES;
+        let rows = (late_changes.len() - count) * COORDINATES;
         let displacement =
-            |row: usize, turn: usize| late_moves[row / COORDINATES + turn][row % COORDINATES];
+            |row: usize, turn: usize| late_changes[row / COORDINATES + turn][row % COORDINATES];
         let current_displacements = Mat::from_fn(rows, count, displacement);
         let next_displacements = Mat::from_fn(rows, 1, |i, _| displacement(i, count));
         let factors = current_displacements.qr().solve_lstsq(&next_displacements);
         let relative_residual = (&current_displacements * &factors - &next_displacements).norm_l2()
             / next_displacements.norm_l2();
-        let companion = Mat::from_fn(count, count, |i, k| match i + 1 == count {
+        let companion_matrix = Mat::from_fn(count, count, |i, k| match i + 1 == count {
             true => factors[(k, 0)],
             false => f64::from(u8::from(k == i + 1)),
         });
-        let magnitudes = companion.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
+        let magnitudes = companion_matrix.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
         (magnitudes.fold(0.0, f64::max), relative_residual)
     };
     let [single, pair] = [1, 2].map(fit_multipliers);
@@ -295,28 +303,28 @@ fn largest_multiplier(moves: &[[f64; COORDINATES]]) -> f64 {
 fn the_largest_multiplier_is_found_of_one_to_three() {
     let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
     let other_shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
-    let moves = |coordinates_at: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
+    let turn_changes = |coordinates_at: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
         let displacements_at = |k: i32| {
             let [a, b] = coordinates_at(k);
             core::array::from_fn(|i| a * shape[i] + b * other_shape[i])
         };
         (0..60).map(displacements_at).collect()
     };
-    let single = moves(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
+    let single = turn_changes(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
     assert!((largest_multiplier(&single) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&single));
-    let pair = moves(&|k| {
+    let pair = turn_changes(&|k| {
         let size = 1.07_f64.powi(k);
         [size * (2.1 * f64::from(k)).cos(), size * (2.1 * f64::from(k)).sin()]
     });
     assert!((largest_multiplier(&pair) - 1.07).abs() < 1e-6, "{}", largest_multiplier(&pair));
-    let real_pair = moves(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
+    let real_pair = turn_changes(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
     assert!(
         (largest_multiplier(&real_pair) - 1.09).abs() < 1e-6,
         "{}",
         largest_multiplier(&real_pair)
     );
     // The pair and the third multiplier grow nearly equally fast.
-    let pair_and_real = moves(&|k| {
+    let pair_and_real = turn_changes(&|k| {
         let size = 1.25_f64.powi(k);
         let pair = size * (2.1 * f64::from(k)).cos();
         [pair, 0.5 * size * (2.1 * f64::from(k)).sin() + (-1.2_f64).powi(k)]
@@ -330,14 +338,14 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
 
 #[test]
 fn disturbances_of_simulated_runs_grow_as_fast() {
-    let growing: Vec<Value> = reference_list("points")
+    let growing_cases: Vec<Value> = read_reference_list("points")
         .into_iter()
-        .filter(|case| number(case, "growth_per_s") > 0.2)
+        .filter(|case| read_number(case, "growth_per_s") > 0.2)
         .collect();
-    assert!(growing.len() >= 10);
-    for case in growing.iter().take(10) {
-        let response = response_at(machine_of_case(case), number(case, "speed_rpm"));
-        let simulated_per_s = simulated_growth_per_s(machine_of_case(case), &response);
+    assert!(growing_cases.len() >= 10);
+    for case in growing_cases.iter().take(10) {
+        let response = response_at(machine_of_case(case), read_number(case, "speed_rpm"));
+        let simulated_per_s = simulate_growth_per_s(machine_of_case(case), &response);
         let error = simulated_per_s / response.growth_per_s() - 1.0;
         println!("{error:e}");
         assert!(error.abs() < 0.01, "{case}: {simulated_per_s}");
@@ -351,29 +359,29 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
     let mut machine = machine_with(0.0, 140.0);
     machine.drum.inertia_kg_m2[2] = machine.drum.inertia_kg_m2[1];
     for speed_rpm in [60.0, 250.0, 900.0] {
-        let point = prepared(machine.clone(), speed_rpm);
+        let point = prepare_at_speed(machine.clone(), speed_rpm);
         let turn_s = 60.0 / speed_rpm;
-        let speed = speed_rpm * TAU / 60.0;
-        let matrices = point.matrices(0.0, speed, 0.0);
+        let speed_rad_per_s = speed_rpm * TAU / 60.0;
+        let matrices = point.matrices(0.0, speed_rad_per_s, 0.0);
         let to_matrix = |m: &[[f64; COORDINATES]; COORDINATES]| {
             Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
         };
         let mass = to_matrix(&matrices.mass).partial_piv_lu();
         use faer::linalg::solvers::Solve as _;
         let [k, c] = [&matrices.stiffness, &matrices.damping].map(|m| mass.solve(to_matrix(m)));
-        let unit = 1e4;
+        let unit_per_s = 1e4;
         let system_matrix = Mat::from_fn(STATES, STATES, |i, j| {
             let row = i % COORDINATES;
             let column = j % COORDINATES;
             let model_term = match (i < COORDINATES, j < COORDINATES) {
                 (true, true) => 0.0,
-                (true, false) => f64::from(u8::from(row == column)) * unit,
-                (false, true) => -k[(row, column)] / unit,
+                (true, false) => f64::from(u8::from(row == column)) * unit_per_s,
+                (false, true) => -k[(row, column)] / unit_per_s,
                 (false, false) => -c[(row, column)],
             };
             let rotation_term = match (row, column, i / COORDINATES == j / COORDINATES) {
-                (8, 9, true) => -speed,
-                (9, 8, true) => speed,
+                (8, 9, true) => -speed_rad_per_s,
+                (9, 8, true) => speed_rad_per_s,
                 _ => 0.0,
             };
             model_term + rotation_term
@@ -381,7 +389,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let setup = Settings::new(&point).held_case(speed_rpm).unwrap().setup;
         let rest_state =
             core::array::from_fn(|i| if i < COORDINATES { point.equilibrium()[i] } else { 0.0 });
-        let computed = find_response(&setup, rest_state).1;
+        let computed_multipliers = find_response(&setup, rest_state).1;
         // The eigenvalues of the suspension's motions.
         let suspension_eigenvalues =
             system_matrix.eigenvalues().unwrap().into_iter().filter(|s| s.norm() < 100.0);
@@ -393,8 +401,10 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         );
         for s in suspension_eigenvalues {
             let mu = (s * turn_s).exp();
-            let nearest =
-                computed.iter().map(|our| (our - mu).norm()).fold(f64::INFINITY, f64::min);
+            let nearest = computed_multipliers
+                .iter()
+                .map(|our| (our - mu).norm())
+                .fold(f64::INFINITY, f64::min);
             println!("{speed_rpm}: {s} {nearest:e}");
             assert!(nearest < 1e-4, "{speed_rpm}: {s} {nearest:e}");
         }
@@ -403,26 +413,26 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
 
 #[test]
 fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
-    let point = prepared(machine_with(0.4, 140.0), 250.0);
-    let capped = Settings::new(&point).held_case(250.0).unwrap().setup;
+    let point = prepare_at_speed(machine_with(0.4, 140.0), 250.0);
+    let capped_setup = Settings::new(&point).held_case(250.0).unwrap().setup;
     // The steps are so short that the formula adds no damping to the capped modes.
-    let setup = TurnSetup { step_count: 32 * capped.step_count, ..capped };
+    let setup = TurnSetup { step_count: 32 * capped_setup.step_count, ..capped_setup };
     let nearby_start = response_at(machine_with(0.4, 140.0), 250.0).start_state;
     let (start_state, multipliers) = find_response(&setup, nearby_start);
     let product = multipliers.into_iter().product::<c64>();
-    let trace = Simd::one_lane(TraceIntegral { setup, start_state });
-    let error = product.re.ln() / trace - 1.0;
-    println!("{product} {trace} {error:e}");
-    assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace} {error:e}");
+    let trace_integral = Simd::one_lane(TraceIntegral { setup, start_state });
+    let error = product.re.ln() / trace_integral - 1.0;
+    println!("{product} {trace_integral} {error:e}");
+    assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace_integral} {error:e}");
 }
 
 #[test]
 fn responses_do_not_depend_on_other_requests() {
     let points = [machine_with(0.4, 140.0), machine_with(0.9, 90.0), machine_with(0.05, 300.0)]
-        .map(|m| prepared(m, 100.0));
+        .map(|m| prepare_at_speed(m, 100.0));
     let mut point_with_elements = machine_with(0.4, 20.0);
     add_elements(&mut point_with_elements, &mut fastrand::Rng::with_seed(1));
-    let point_with_elements = prepared(point_with_elements, 100.0);
+    let point_with_elements = prepare_at_speed(point_with_elements, 100.0);
     let held_speeds: Vec<_> = (0..30)
         .map(|k| HeldSpeed { point: &points[k % 3], speed_rpm: 20.0 + 40.0 * k as f64 })
         .chain(
@@ -443,9 +453,11 @@ fn responses_do_not_depend_on_other_requests() {
 #[test]
 fn val_branches_match_an_independent_program() {
     for case in read_reference("branches.json").as_array().unwrap() {
-        let machine =
-            machine_with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"));
-        let point = prepared(machine, 100.0);
+        let machine = machine_with(
+            read_number(case, "unbalance_mass_kg"),
+            read_number(case, "damping_n_s_per_m"),
+        );
+        let point = prepare_at_speed(machine, 100.0);
         let mut folds_rpm = Vec::new();
         for (direction, lost_key) in [("up", "up_lost_after_rpm"), ("down", "down_lost_below_rpm")]
         {
@@ -454,25 +466,26 @@ fn val_branches_match_an_independent_program() {
                 .iter()
                 .map(|reference_row| HeldSpeed {
                     point: &point,
-                    speed_rpm: number(reference_row, "speed_rpm"),
+                    speed_rpm: read_number(reference_row, "speed_rpm"),
                 })
                 .collect();
             for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds))
             {
                 let responses = responses.unwrap();
-                let computed =
+                let computed_response =
                     if direction == "up" { responses.first() } else { responses.last() }.unwrap();
                 for (channel, name) in [(6, "tub_yaw_rad"), (7, "tub_pitch_rad")] {
-                    let error =
-                        computed.nonlinear_peaks[channel] / number(reference_row, name) - 1.0;
+                    let error = computed_response.nonlinear_peaks[channel]
+                        / read_number(reference_row, name)
+                        - 1.0;
                     assert!(error.abs() < 1e-4, "{reference_row}: {name} {error:e}");
                 }
-                let growth = number(reference_row, "growth_per_s");
+                let growth = read_number(reference_row, "growth_per_s");
                 if growth > 0.0 {
-                    let difference = computed.growth_per_s() - growth;
+                    let difference = computed_response.growth_per_s() - growth;
                     assert!(difference.abs() < 5e-3, "{reference_row}: {difference:e}");
                 }
-                folds_rpm.extend(computed.fold_speeds_rpm);
+                folds_rpm.extend(computed_response.fold_speeds_rpm);
             }
             if let Some(lost_rpm) = case[lost_key].as_f64() {
                 let nearest = folds_rpm.iter().flatten().map(|rpm: &f64| (rpm - lost_rpm).abs());
@@ -487,7 +500,7 @@ fn val_branches_match_an_independent_program() {
 /// The upward curve approaches a spring that passes its hook, and does not exceed 148 rpm.
 #[test]
 fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
-    let point = prepared(machine_with(0.9, 20.0), 100.0);
+    let point = prepare_at_speed(machine_with(0.9, 20.0), 100.0);
     let held_speeds = [240.0, 260.0, 340.0].map(|speed_rpm| HeldSpeed { point: &point, speed_rpm });
     let responses_by_speed: Vec<_> =
         all_responses(&held_speeds).into_iter().map(Result::unwrap).collect();
@@ -514,16 +527,16 @@ fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
 /// Returns the paper's machine with masses, inertias, stiffnesses, damping and unbalance multiplied
 /// by random factors.
 fn random_machine(numbers: &mut fastrand::Rng) -> Machine {
-    let mut factor = |low: f64, high: f64| low * (high / low).powf(numbers.f64());
-    let mut machine = machine_with(factor(0.05, 1.5), factor(30.0, 250.0));
-    machine.tub.mass_kg *= factor(0.5, 2.0);
-    machine.drum.mass_kg *= factor(0.5, 2.0);
+    let mut random_factor = |low: f64, high: f64| low * (high / low).powf(numbers.f64());
+    let mut machine = machine_with(random_factor(0.05, 1.5), random_factor(30.0, 250.0));
+    machine.tub.mass_kg *= random_factor(0.5, 2.0);
+    machine.drum.mass_kg *= random_factor(0.5, 2.0);
     for i in 0..3 {
-        machine.tub.inertia_kg_m2[i] *= factor(0.6, 1.6);
+        machine.tub.inertia_kg_m2[i] *= random_factor(0.6, 1.6);
     }
-    machine.springs.iter_mut().for_each(|s| s.stiffness_n_per_m *= factor(0.5, 2.0));
-    machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m *= factor(0.7, 1.4));
-    machine.flexure.stiffness_n_m_per_rad *= factor(0.5, 2.0);
+    machine.springs.iter_mut().for_each(|s| s.stiffness_n_per_m *= random_factor(0.5, 2.0));
+    machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m *= random_factor(0.7, 1.4));
+    machine.flexure.stiffness_n_m_per_rad *= random_factor(0.5, 2.0);
     machine
 }
 
@@ -568,42 +581,43 @@ fn growth_of_random_machines_agrees_with_simulations() {
         if number >= machines && !lacks_a_kind(&growing_counts) && !lacks_a_kind(&decaying_counts) {
             break;
         }
-        let kind = (number % 2) as usize;
+        let machine_kind = (number % 2) as usize;
         let mut machine = random_machine(&mut numbers);
-        if kind == 1 {
+        if machine_kind == 1 {
             add_elements(&mut machine, &mut numbers);
         }
-        let point = prepared(machine.clone(), 100.0);
-        let speeds: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
+        let point = prepare_at_speed(machine.clone(), 100.0);
+        let speeds_rpm: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
         let held_speeds: Vec<_> =
-            speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
+            speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
         let results = all_responses(&held_speeds);
         let first_responses = || results.iter().flatten().filter_map(|responses| responses.first());
         for response in first_responses()
             .filter(|response| (0.2..2.0).contains(&response.growth_per_s()))
             .take(2)
         {
-            let simulated_per_s = simulated_growth_per_s(machine.clone(), response);
+            let simulated_per_s = simulate_growth_per_s(machine.clone(), response);
             let error = (simulated_per_s / response.growth_per_s() - 1.0).abs();
             println!("machine {number}, {} rpm: {error:e}", response.speed_rpm);
-            max_error[kind] = max_error[kind].max(error);
-            growing_counts[kind] += 1;
+            max_error[machine_kind] = max_error[machine_kind].max(error);
+            growing_counts[machine_kind] += 1;
         }
         for response in first_responses().filter(|response| response.growth_per_s() < -0.3).take(1)
         {
-            let moves = simulated_moves(machine.clone(), response, 20.0);
-            let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
-            let max_size =
-                |moves: &[[f64; COORDINATES]]| moves.iter().map(size).fold(0.0, f64::max);
+            let turn_changes = simulate_turn_changes(machine.clone(), response, 20.0);
+            let change_size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
+            let max_change_size = |turn_changes: &[[f64; COORDINATES]]| {
+                turn_changes.iter().map(change_size).fold(0.0, f64::max)
+            };
             // The final changes are compared with the first ones: a motion that leaves for another
             // one changes most on the way, and little at the end.
-            let [begin, end] = [moves.len() / 5, moves.len() * 4 / 5];
-            let disturbance = max_size(&moves[..begin]);
-            let remaining_share = max_size(&moves[end..]) / disturbance;
+            let [begin, end] = [turn_changes.len() / 5, turn_changes.len() * 4 / 5];
+            let initial_change = max_change_size(&turn_changes[..begin]);
+            let remaining_share = max_change_size(&turn_changes[end..]) / initial_change;
             println!("machine {number}, {} rpm: {remaining_share:e} left", response.speed_rpm);
-            assert!(disturbance < 1e-4, "machine {number}: {response:?}");
+            assert!(initial_change < 1e-4, "machine {number}: {response:?}");
             assert!(remaining_share < 0.1, "machine {number}: {response:?}");
-            decaying_counts[kind] += 1;
+            decaying_counts[machine_kind] += 1;
         }
     }
     println!("{growing_counts:?} grown, errors up to {max_error:?}; {decaying_counts:?} decayed");
@@ -630,14 +644,14 @@ fn no_branch_is_lost_between_two_others() {
         let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = damping_n_s_per_m);
         machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = 5e6 * numbers.f64());
-        let point = prepared(machine, 100.0);
-        let speeds: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
+        let point = prepare_at_speed(machine, 100.0);
+        let speeds_rpm: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
         let held_speeds: Vec<_> =
-            speeds.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-        for (responses, speed_rpm) in all_responses(&held_speeds).into_iter().zip(speeds) {
+            speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
+        for (responses, speed_rpm) in all_responses(&held_speeds).into_iter().zip(speeds_rpm) {
             let Ok(responses) = responses else { continue };
-            let on_curve = responses.iter().filter(|response| response.is_on_curve);
-            let branches: Vec<u32> = on_curve.map(|response| response.branch).collect();
+            let curve_responses = responses.iter().filter(|response| response.is_on_curve);
+            let branches: Vec<u32> = curve_responses.map(|response| response.branch).collect();
             let alternates = |pair: &[u32]| pair[0] % 2 != pair[1] % 2;
             speeds_with_several += usize::from(branches.len() > 1);
             if !branches.windows(2).all(alternates) {
@@ -657,7 +671,7 @@ fn continued_responses_are_those_of_short_steps() {
     let count = 30;
     let mut numbers = fastrand::Rng::with_seed(32);
     let points: Vec<Point> =
-        (0..count).map(|_| prepared(random_machine(&mut numbers), 100.0)).collect();
+        (0..count).map(|_| prepare_at_speed(random_machine(&mut numbers), 100.0)).collect();
     let speed_rpm_at = |step: u32| 60.0 + 0.05 * f64::from(step);
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
     let mut states: Vec<Option<[f64; STATES]>> = points
@@ -669,7 +683,7 @@ fn continued_responses_are_those_of_short_steps() {
     let mut last_changes = vec![0.0_f64; count];
     let mut samples = Vec::new();
     let mut max_error = 0.0_f64;
-    let mut jumps = Vec::new();
+    let mut lost_speeds = Vec::new();
     for step in 1..=6000 {
         let settings_with_states = settings.iter_mut().zip(&states);
         let mut searches: Vec<NewtonSearch<'_>> = settings_with_states
@@ -687,15 +701,15 @@ fn continued_responses_are_those_of_short_steps() {
             let Some(previous_state) = *state else { continue };
             let next_state =
                 searches.next().unwrap().into_response().map(|(start_state, _)| start_state);
-            let distance = |to: &[f64; STATES]| {
+            let distance_to_previous = |to: &[f64; STATES]| {
                 (0..COORDINATES).map(|i| (to[i] - previous_state[i]).abs()).fold(0.0, f64::max)
             };
             *state = next_state.filter(|start_state| {
-                distance(start_state) < f64::max(1e-3, 5.0 * last_changes[k])
+                distance_to_previous(start_state) < f64::max(1e-3, 5.0 * last_changes[k])
             });
-            last_changes[k] = state.as_ref().map_or(0.0, distance);
+            last_changes[k] = state.as_ref().map_or(0.0, distance_to_previous);
             if state.is_none() {
-                jumps.push((k, speed_rpm_at(step)));
+                lost_speeds.push((k, speed_rpm_at(step)));
             }
         }
         if step % 100 == 0 {
@@ -724,8 +738,8 @@ fn continued_responses_are_those_of_short_steps() {
         }
         assert!(!difference.is_nan());
     }
-    println!("{} compared, at most {max_error:e} apart; jumps: {jumps:?}", samples.len());
-    for (k, lost_rpm) in jumps {
+    println!("{} compared, at most {max_error:e} apart; jumps: {lost_speeds:?}", samples.len());
+    for (k, lost_rpm) in lost_speeds {
         let ends = responses_of_point(&points[k], &[lost_rpm - 0.3])[0].fold_speeds_rpm;
         assert!(ends[1].is_some_and(|fold| (fold - lost_rpm).abs() < 0.3), "{k}: {ends:?}");
     }
@@ -739,31 +753,35 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
     let mut machine = machine_with(0.8, 140.0);
     machine.drum.inertia_kg_m2[2] *= 1.3;
     machine.springs[0].stiffness_n_per_m *= 1.2;
-    let point = prepared(machine, 100.0);
+    let point = prepare_at_speed(machine, 100.0);
     let mut settings = Settings::new(&point);
-    let speeds: Vec<f64> = (0..=20)
+    let speeds_rpm: Vec<f64> = (0..=20)
         .flat_map(|k| [630.0, 760.0, 830.0, 960.0].map(|from| from + 3.0 * f64::from(k)))
         .collect();
-    let computed = responses_of_point(&point, &speeds);
-    let mut uncapped_searches: Vec<NewtonSearch<'_>> = speeds
+    let computed_response = responses_of_point(&point, &speeds_rpm);
+    let mut uncapped_searches: Vec<NewtonSearch<'_>> = speeds_rpm
         .iter()
-        .zip(&computed)
-        .map(|(&rpm, computed)| {
+        .zip(&computed_response)
+        .map(|(&rpm, computed_response)| {
             NewtonSearch::new(
                 settings.held_case(rpm).unwrap().without_caps().unwrap().setup,
-                computed.start_state,
+                computed_response.start_state,
                 None,
             )
         })
         .collect();
     assert!(run_searches(&mut uncapped_searches, Cancel::Never));
     let mut max_error = 0.0_f64;
-    for (computed, uncapped) in computed.iter().zip(uncapped_searches) {
+    for (computed_response, uncapped) in computed_response.iter().zip(uncapped_searches) {
         let uncapped_peaks = uncapped.into_response().unwrap().1.peaks;
         for k in 0..CHANNELS {
-            let difference = (computed.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
+            let difference = (computed_response.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
             max_error = max_error.max(difference);
-            assert!(difference < 6e-5, "{} rpm, channel {k}: {difference:e}", computed.speed_rpm);
+            assert!(
+                difference < 6e-5,
+                "{} rpm, channel {k}: {difference:e}",
+                computed_response.speed_rpm
+            );
         }
     }
     println!("{max_error:e}");
@@ -772,46 +790,46 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
 /// Tests friction, stops, a gasket, stiffening springs and a second unbalance.
 #[test]
 fn val_machines_with_elements_match_an_independent_program() {
-    let mut compared = 0;
+    let mut compared_count = 0;
     for case in read_reference("stability_elements.json").as_array().unwrap() {
-        let point = prepared(crate::tests::elements::machine(case), 100.0);
+        let point = prepare_at_speed(crate::tests::elements::read_machine(case), 100.0);
         let reference_rows = case["points"].as_array().unwrap();
         let held_speeds: Vec<HeldSpeed<'_>> = reference_rows
             .iter()
             .map(|reference_row| HeldSpeed {
                 point: &point,
-                speed_rpm: number(reference_row, "speed_rpm"),
+                speed_rpm: read_number(reference_row, "speed_rpm"),
             })
             .collect();
         for (reference_row, responses) in reference_rows.iter().zip(all_responses(&held_speeds)) {
             assert_eq!(reference_row["converged"], true);
             let description = format!("{} at {} rpm", case["name"], reference_row["speed_rpm"]);
-            let computed =
+            let computed_response =
                 responses.unwrap_or_else(|none| panic!("{description}: {none}")).remove(0);
             for channel in [0, 1, 6, 7] {
                 let name = Channel::ALL[channel].name();
                 let unit = Channel::ALL[channel].unit();
-                let expected = number(reference_row, &format!("amplitude_{name}_{unit}"));
-                let error = computed.nonlinear_peaks[channel] / expected - 1.0;
+                let expected = read_number(reference_row, &format!("amplitude_{name}_{unit}"));
+                let error = computed_response.nonlinear_peaks[channel] / expected - 1.0;
                 assert!(error.abs() < 1.2e-5, "{description}: {name} {error:e}");
             }
             // If all disturbances decay, the slowest is that of the hinge, which is not compared.
-            let growth = number(reference_row, "growth_per_s");
+            let growth = read_number(reference_row, "growth_per_s");
             if growth > 0.0 {
-                let difference = computed.growth_per_s() - growth;
+                let difference = computed_response.growth_per_s() - growth;
                 assert!(difference.abs() < 1e-3, "{description}: {difference:e}");
             }
-            compared += 1;
+            compared_count += 1;
         }
     }
-    assert_eq!(compared, 39);
+    assert_eq!(compared_count, 39);
 }
 
 #[test]
 fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     // An independent program has, for the first mode at 1200 rpm, a frequency of 65.20 per minute,
     // and 65.95 with theta frozen; the damping of the second mode at its resonance differs by 8 %.
-    let point = prepared(machine_with(0.4, 140.0), 100.0);
+    let point = prepare_at_speed(machine_with(0.4, 140.0), 100.0);
     let first_mode = floquet_modes(&point, 1200.0).unwrap()[0];
     println!("{} {}", first_mode.frequency_rpm(), first_mode.frozen_mode.frequency_rpm());
     assert!((first_mode.frequency_rpm() - 65.20).abs() < 0.01);
@@ -824,8 +842,9 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
 #[test]
 fn a_linear_response_linearises_friction_at_its_own_speed() {
     let amplitude_at = |speed_rpm: f64, given_m_per_s: Option<f64>| {
-        let machine = crate::tests::friction::machine(0.3, [40.0, 60.0], given_m_per_s);
-        let point = prepared(machine, speed_rpm);
+        let machine =
+            crate::tests::friction::machine_with_friction(0.3, [40.0, 60.0], given_m_per_s);
+        let point = prepare_at_speed(machine, speed_rpm);
         let held_case = Settings::new(&point).held_case(150.0).unwrap();
         let peaks = linear_responses_with_motion_friction(&[held_case.setup], Cancel::Never)
             .remove(0)
@@ -843,7 +862,7 @@ fn a_linear_response_linearises_friction_at_its_own_speed() {
 #[test]
 #[ignore = "prints what a response costs"]
 fn cost() {
-    let point = prepared(machine_with(0.4, 140.0), 100.0);
+    let point = prepare_at_speed(machine_with(0.4, 140.0), 100.0);
     let held_speeds: Vec<_> = (0..560)
         .map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) })
         .collect();
@@ -876,7 +895,7 @@ fn machine_that_hits_stops(unbalance_mass_kg: f64) -> Machine {
 /// that this gives the period map, so that 260 rpm had no response.
 #[test]
 fn a_curve_passes_the_corners_of_stops() {
-    let point = prepared(machine_that_hits_stops(0.4), 100.0);
+    let point = prepare_at_speed(machine_that_hits_stops(0.4), 100.0);
     let held_speed = HeldSpeed { point: &point, speed_rpm: 260.0 };
     let responses = all_responses(&[held_speed]).remove(0).unwrap();
     let branches: Vec<u32> = responses.iter().map(|response| response.branch).collect();

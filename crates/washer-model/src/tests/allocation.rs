@@ -8,7 +8,7 @@ use lane_ode::{Simd, Tolerance};
 fn a_long_trajectory_allocates_no_more_than_a_short_one() {
     let tolerance =
         Tolerance { relative: 1e-4, absolute: 1e-7, max_steps: 1_000_000, longest_step_s: None };
-    let allocations = |simd, model, method: &Method, recorders, end_s| {
+    let count_allocations = |simd, model, method: &Method, recorders, end_s| {
         // There are more points than lanes, so that lanes start further points.
         let points: Vec<_> = (0..11)
             .map(|i| {
@@ -20,24 +20,24 @@ fn a_long_trajectory_allocates_no_more_than_a_short_one() {
             })
             .collect();
         let points: Vec<_> = points.iter().collect();
-        let mut steps = 0;
-        let heap = allocation_counter::measure(|| {
-            steps = simulate_with(simd, model, method, &points, recorders)
+        let mut step_count = 0;
+        let allocation_info = allocation_counter::measure(|| {
+            step_count = simulate_with(simd, model, method, &points, recorders)
                 .0
                 .iter()
                 .map(|r| r.accepted_steps)
                 .sum();
         });
-        (heap.count_total, steps)
+        (allocation_info.count_total, step_count)
     };
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         for model in [ModelKind::Nonlinear, ModelKind::Linear] {
             for method in [Method::rk4(2e-4), Method::dopri5(tolerance)] {
                 for recorders in [Recorders::default(), ALL_RECORDERS] {
                     let (short_count, short_steps) =
-                        allocations(simd, model, &method, recorders, 0.02);
+                        count_allocations(simd, model, &method, recorders, 0.02);
                     let (long_count, long_steps) =
-                        allocations(simd, model, &method, recorders, 0.2);
+                        count_allocations(simd, model, &method, recorders, 0.2);
                     assert!(long_steps > 5 * short_steps, "{short_steps} and {long_steps} steps");
                     // The set-up of each of the 11 points may allocate once more or less, depending
                     // on the last point in its lane. Steps must not allocate.

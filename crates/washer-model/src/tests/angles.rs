@@ -21,16 +21,16 @@ fn drum_point<T: Real>(
     hinge_x_m: f64,
     position_m: [f64; 3],
 ) -> [N<T>; 3] {
-    let about_2 =
+    let rotate_about_2 =
         |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x + sin * z, y, cos * z - sin * x];
-    let about_3 =
+    let rotate_about_3 =
         |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x - sin * y, sin * x + cos * y, z];
     let [x, y, z] = position_m.map(|component| theta.lit(component));
-    let from_hinge = about_3(q[9].sin_cos(), [x - hinge_x_m, y, z]);
-    let [x, y, z] = about_2(q[8].sin_cos(), from_hinge);
+    let from_hinge = rotate_about_3(q[9].sin_cos(), [x - hinge_x_m, y, z]);
+    let [x, y, z] = rotate_about_2(q[8].sin_cos(), from_hinge);
     let (sin, cos) = theta.sin_cos();
     let tub_position = [x + hinge_x_m, cos * y - sin * z, sin * y + cos * z];
-    let [x, y, z] = about_2(q[6].sin_cos(), about_3(q[7].sin_cos(), tub_position));
+    let [x, y, z] = rotate_about_2(q[6].sin_cos(), rotate_about_3(q[7].sin_cos(), tub_position));
     [x, y + q[2], z + q[3]]
 }
 
@@ -52,12 +52,13 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
         };
         let mut heavier_machine = machine.clone();
         heavier_machine.further_unbalances.push(added_unbalance);
-        let mut random = |size: f64| size * (2.0 * rng.f64() - 1.0);
-        let [angle, speed, acceleration] = [random(3.0), random(130.0), random(10.0)];
+        let mut random_within = |size: f64| size * (2.0 * rng.f64() - 1.0);
+        let [angle, speed, acceleration] =
+            [random_within(3.0), random_within(130.0), random_within(10.0)];
         let spin = SpinState::new(N(angle).sin_cos(), N(speed), N(acceleration));
-        let mut vector =
-            |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| random(size)) };
-        let [q, u, a] = [vector(0.05), vector(0.5), vector(20.0)];
+        let mut random_vector =
+            |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| random_within(size)) };
+        let [q, u, a] = [random_vector(0.05), random_vector(0.5), random_vector(20.0)];
         let residual = |machine: &Machine| {
             let coefficients = MachineCoefficients::new(machine);
             let [inertia, force] = equations(&coefficients, &spin, &q.map(N), &u.map(N), &a.map(N));
@@ -98,13 +99,14 @@ fn an_unbalance_at_an_angle_is_a_point_mass() {
 
 #[test]
 fn quarter_turns_are_exact() {
-    let unbalance = |radius_m, angle_deg| Unbalance { radius_m, angle_deg, ..Unbalance::default() };
-    assert_eq!(unbalance(0.2, 0.0).position_m(), [0.2, 0.0]);
-    assert_eq!(unbalance(0.2, 90.0).position_m(), [0.0, 0.2]);
-    assert_eq!(unbalance(0.2, -90.0).position_m(), [0.0, -0.2]);
-    assert_eq!(unbalance(0.2, 180.0).position_m(), unbalance(-0.2, 0.0).position_m());
-    assert_eq!(unbalance(0.2, 270.0).position_m(), [0.0, -0.2]);
-    let [y, z] = unbalance(0.2, 150.0).position_m();
+    let unbalance_at =
+        |radius_m, angle_deg| Unbalance { radius_m, angle_deg, ..Unbalance::default() };
+    assert_eq!(unbalance_at(0.2, 0.0).position_m(), [0.2, 0.0]);
+    assert_eq!(unbalance_at(0.2, 90.0).position_m(), [0.0, 0.2]);
+    assert_eq!(unbalance_at(0.2, -90.0).position_m(), [0.0, -0.2]);
+    assert_eq!(unbalance_at(0.2, 180.0).position_m(), unbalance_at(-0.2, 0.0).position_m());
+    assert_eq!(unbalance_at(0.2, 270.0).position_m(), [0.0, -0.2]);
+    let [y, z] = unbalance_at(0.2, 150.0).position_m();
     assert!((y + 0.1 * 3.0_f64.sqrt()).abs() < 1e-16 && (z - 0.1).abs() < 1e-16, "{y} {z}");
 }
 
@@ -129,10 +131,10 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
     let [forwards, mirrored] =
         [simulate_deviations(&machine, 300.0), simulate_deviations(&machine.mirrored(), -300.0)];
     // The mirror reverses translations along z and rotations about y.
-    let signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
+    let mirror_signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
     for (k, (forward, backward)) in forwards.iter().zip(&mirrored).enumerate() {
         for i in 0..COORDINATES {
-            let error = (forward[i] - signs[i] * backward[i]).abs();
+            let error = (forward[i] - mirror_signs[i] * backward[i]).abs();
             assert!(error < 1e-12, "instant {k}, q{}: {} {}", i + 1, forward[i], backward[i]);
         }
     }
@@ -148,17 +150,21 @@ fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
         for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
             let simulate_points =
                 |points: &[&Point]| simulate(simd, model, &Method::rk4(2e-4), points);
-            let together = simulate_points(&[
+            let batch_records = simulate_points(&[
                 &reference,
                 &rotated_unbalance,
                 &reference,
                 &rotated_unbalance,
                 &reference,
             ]);
-            let alone = simulate_points(&[&reference])[0];
-            assert_eq!([together[0], together[2], together[4]], [alone; 3], "{model:?} {simd:?}");
+            let single_record = simulate_points(&[&reference])[0];
             assert_eq!(
-                [together[1], together[3]],
+                [batch_records[0], batch_records[2], batch_records[4]],
+                [single_record; 3],
+                "{model:?} {simd:?}"
+            );
+            assert_eq!(
+                [batch_records[1], batch_records[3]],
                 [simulate_points(&[&rotated_unbalance])[0]; 2],
                 "{model:?} {simd:?}"
             );
@@ -189,15 +195,15 @@ fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
     for elongation_m in [-0.006, -0.0041, 0.0, 0.001, 0.0038, 0.005] {
         for speed in [-0.2, -0.004, 0.03] {
             let force = force_at(elongation_m, speed);
-            let step = 1e-7;
-            let force_per_depth = (force_at(elongation_m + step, speed).force
-                - force_at(elongation_m - step, speed).force)
+            let difference_step = 1e-7;
+            let force_per_depth = (force_at(elongation_m + difference_step, speed).force
+                - force_at(elongation_m - difference_step, speed).force)
                 .0
-                / (2.0 * step);
-            let force_per_speed = (force_at(elongation_m, speed + step).force
-                - force_at(elongation_m, speed - step).force)
+                / (2.0 * difference_step);
+            let force_per_speed = (force_at(elongation_m, speed + difference_step).force
+                - force_at(elongation_m, speed - difference_step).force)
                 .0
-                / (2.0 * step);
+                / (2.0 * difference_step);
             assert!(
                 (force.force_per_depth.0 - force_per_depth).abs()
                     < 1e-3 + 1e-5 * force_per_depth.abs()

@@ -36,7 +36,7 @@ const METHODS: [Method; 5] = [
 /// Returns eleven scenarios, so that some of four or eight lanes stay idle: the corners, the
 /// middles of the edges and the centre of the quick map, and two more points, with a spin of one
 /// second.
-fn quick_map() -> Vec<BitsScenario> {
+fn quick_map_scenarios() -> Vec<BitsScenario> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
     let grid_points =
         [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
@@ -47,7 +47,7 @@ fn quick_map() -> Vec<BitsScenario> {
 }
 
 /// Returns random machines with spins of all kinds.
-fn random_machines() -> Vec<BitsScenario> {
+fn random_scenarios() -> Vec<BitsScenario> {
     let mut rng = fastrand::Rng::with_seed(31);
     (0..11).map(|i| (random_machine(&mut rng), random_spin(&mut rng, i, END_S))).collect()
 }
@@ -98,10 +98,10 @@ fn select_scenarios(results: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec
 }
 
 fn assert_same_on_every_instruction_set(scenarios: &[BitsScenario]) {
-    let scalar = simulate_batch(Simd::Scalar, scenarios);
+    let scalar_results = simulate_batch(Simd::Scalar, scenarios);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         assert!(
-            simulate_batch(simd, scenarios) == scalar,
+            simulate_batch(simd, scenarios) == scalar_results,
             "{} gives other bits than scalar",
             simd.name()
         );
@@ -110,28 +110,32 @@ fn assert_same_on_every_instruction_set(scenarios: &[BitsScenario]) {
 
 fn assert_same_at_any_position(scenarios: &[BitsScenario]) {
     let count = scenarios.len();
-    let in_order = simulate_batch(Simd::widest(), scenarios);
+    let ordered_results = simulate_batch(Simd::widest(), scenarios);
     for shift in [1, 2, 3, 5, 7] {
-        let order: Vec<_> = (0..count).map(|i| (i + shift) % count).collect();
-        let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+        let scenario_order: Vec<_> = (0..count).map(|i| (i + shift) % count).collect();
+        let reordered_scenarios: Vec<_> =
+            scenario_order.iter().map(|&i| scenarios[i].clone()).collect();
         assert!(
-            simulate_batch(Simd::widest(), &reordered) == select_scenarios(&in_order, &order),
+            simulate_batch(Simd::widest(), &reordered_scenarios)
+                == select_scenarios(&ordered_results, &scenario_order),
             "moved by {shift}"
         );
     }
-    let order: Vec<_> = (0..count).rev().collect();
-    let reordered: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
+    let scenario_order: Vec<_> = (0..count).rev().collect();
+    let reordered_scenarios: Vec<_> =
+        scenario_order.iter().map(|&i| scenarios[i].clone()).collect();
     assert!(
-        simulate_batch(Simd::widest(), &reordered) == select_scenarios(&in_order, &order),
+        simulate_batch(Simd::widest(), &reordered_scenarios)
+            == select_scenarios(&ordered_results, &scenario_order),
         "backwards"
     );
 }
 
 fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
-    let together = simulate_batch(Simd::widest(), scenarios);
+    let batch_results = simulate_batch(Simd::widest(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
-        let alone = simulate_batch(Simd::widest(), core::slice::from_ref(scenario));
-        assert!(alone == select_scenarios(&together, &[i]), "scenario {i} alone");
+        let single_results = simulate_batch(Simd::widest(), core::slice::from_ref(scenario));
+        assert!(single_results == select_scenarios(&batch_results, &[i]), "scenario {i} alone");
     }
     // Two consecutive points fail, one early and one late, and other points start in their lanes.
     let failing_scenario = |ramp_s: f64| {
@@ -142,45 +146,45 @@ fn assert_same_with_any_other_points(scenarios: &[BitsScenario]) {
     mixed_scenarios.insert(5, failing_scenario(0.3));
     let other_points: Vec<_> = (0..mixed_scenarios.len()).filter(|i| ![1, 5].contains(i)).collect();
     let results_beside_failing = simulate_batch(Simd::widest(), &mixed_scenarios);
-    let nonlinear = &results_beside_failing[0];
+    let nonlinear_results = &results_beside_failing[0];
     assert!(
-        [1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()),
+        [1, 5].iter().all(|&i| nonlinear_results[i].len() < nonlinear_results[0].len()),
         "the added points fail"
     );
     assert!(
-        select_scenarios(&results_beside_failing, &other_points) == together,
+        select_scenarios(&results_beside_failing, &other_points) == batch_results,
         "beside failing neighbours"
     );
 }
 
 #[test]
 fn same_bits_on_every_instruction_set_quick_map() {
-    assert_same_on_every_instruction_set(&quick_map());
+    assert_same_on_every_instruction_set(&quick_map_scenarios());
 }
 
 #[test]
 fn same_bits_on_every_instruction_set_random_machines() {
-    assert_same_on_every_instruction_set(&random_machines());
+    assert_same_on_every_instruction_set(&random_scenarios());
 }
 
 #[test]
 fn same_bits_at_any_position_in_a_batch_quick_map() {
-    assert_same_at_any_position(&quick_map());
+    assert_same_at_any_position(&quick_map_scenarios());
 }
 
 #[test]
 fn same_bits_at_any_position_in_a_batch_random_machines() {
-    assert_same_at_any_position(&random_machines());
+    assert_same_at_any_position(&random_scenarios());
 }
 
 #[test]
 fn same_bits_with_any_other_points_quick_map() {
-    assert_same_with_any_other_points(&quick_map());
+    assert_same_with_any_other_points(&quick_map_scenarios());
 }
 
 #[test]
 fn same_bits_with_any_other_points_random_machines() {
-    assert_same_with_any_other_points(&random_machines());
+    assert_same_with_any_other_points(&random_scenarios());
 }
 
 /// Integrates a segment with more steps than the integrator makes between two polls of its
@@ -199,21 +203,21 @@ fn blocks_of_steps_do_not_change_bits() {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all_points: Vec<_> = points.iter().collect();
-    let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
-    for method in [Method::rk4(2e-5), dop853] {
+    let dop853_method = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
+    for method in [Method::rk4(2e-5), dop853_method] {
         for model in MODELS {
-            let together = simulate_with(simd, model, &method, &all_points, ALL_RECORDERS);
+            let batch_results = simulate_with(simd, model, &method, &all_points, ALL_RECORDERS);
             assert!(
-                together.0[0].accepted_steps > 3 * CANCEL_POLL_STEPS,
+                batch_results.0[0].accepted_steps > 3 * CANCEL_POLL_STEPS,
                 "{} steps",
-                together.0[0].accepted_steps
+                batch_results.0[0].accepted_steps
             );
             for (k, point) in all_points.iter().enumerate() {
-                let alone = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
-                let expected = record_bits((&together.0[k], &together.1[k]));
+                let single_results = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
+                let expected_bits = record_bits((&batch_results.0[k], &batch_results.1[k]));
                 assert_eq!(
-                    record_bits((&alone.0[0], &alone.1[0])),
-                    expected,
+                    record_bits((&single_results.0[0], &single_results.1[0])),
+                    expected_bits,
                     "{model:?} by {method:?}, {k}"
                 );
             }
@@ -231,9 +235,9 @@ fn every_method_stops_within_a_segment() {
     let point = prepare(Simd::widest(), &[scenario], &timing).remove(0).unwrap();
     let tolerance =
         Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000, longest_step_s: None };
-    let dop853 = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
-    let adaptive = [Method::dopri5(tolerance), Method::additive(tolerance)];
-    for method in [Method::rk4(2e-5), dop853].into_iter().chain(adaptive) {
+    let dop853_method = Method::capped(MethodKind::Capped0, 2e-5, CAPS);
+    let adaptive_methods = [Method::dopri5(tolerance), Method::additive(tolerance)];
+    for method in [Method::rk4(2e-5), dop853_method].into_iter().chain(adaptive_methods) {
         for model in MODELS {
             let call_count = AtomicU32::new(0);
             let run_until = |max_calls: u32| {

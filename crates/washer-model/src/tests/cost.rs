@@ -3,7 +3,7 @@
 use super::instruments::{paper_machine, prepare_point, triangular_spin};
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::{Caps, Coupling};
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use core::cell::Cell;
 use lane_ode::{Lane, N, Real};
 
@@ -14,7 +14,7 @@ struct OperationCount {
     multiplications: u32,
     additions: u32,
     /// The number of fused multiplications and additions.
-    fused: u32,
+    fused_operations: u32,
     divisions: u32,
     square_roots: u32,
     /// The number of evaluations of sine and cosine of an angle, whose own operations are not
@@ -23,10 +23,10 @@ struct OperationCount {
 }
 
 thread_local! {
-    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount {
+    static OPERATION_COUNT: Cell<OperationCount> = const { Cell::new(OperationCount {
         multiplications: 0,
         additions: 0,
-        fused: 0,
+        fused_operations: 0,
         divisions: 0,
         square_roots: 0,
         sine_cosine_pairs: 0,
@@ -34,7 +34,7 @@ thread_local! {
 }
 
 fn update_count(change: impl FnOnce(&mut OperationCount)) {
-    COUNT.with(|cell| {
+    OPERATION_COUNT.with(|cell| {
         let mut operations = cell.get();
         change(&mut operations);
         cell.set(operations);
@@ -43,16 +43,16 @@ fn update_count(change: impl FnOnce(&mut OperationCount)) {
 
 /// Returns the result of a function, and the number of its operations.
 fn count_operations<R>(function: impl FnOnce() -> R) -> (R, OperationCount) {
-    COUNT.with(|cell| cell.set(OperationCount::default()));
+    OPERATION_COUNT.with(|cell| cell.set(OperationCount::default()));
     let result = function();
-    (result, COUNT.with(Cell::get))
+    (result, OPERATION_COUNT.with(Cell::get))
 }
 
 fn count_fused() {
     update_count(|operations| {
         operations.multiplications += 1;
         operations.additions += 1;
-        operations.fused += 1;
+        operations.fused_operations += 1;
     });
 }
 
@@ -170,14 +170,14 @@ fn count_observation<M: LaneModel<CountingNumber>>() -> OperationCount {
     count_operations(|| model.observe(&forcing, &x, &x, true)).1
 }
 
-const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
+const CAPS: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
 
 fn nonlinear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
-    count_evaluation::<Nonlinear<CountingNumber>, Nonlinear<f64>>(caps)
+    count_evaluation::<NonlinearModel<CountingNumber>, NonlinearModel<f64>>(caps)
 }
 
 fn linear_cost(caps: Option<Caps>) -> [OperationCount; 2] {
-    count_evaluation::<Linear<CountingNumber>, Linear<f64>>(caps)
+    count_evaluation::<LinearModel<CountingNumber>, LinearModel<f64>>(caps)
 }
 
 /// Returns the sum of all operations but sines and cosines.
@@ -186,21 +186,35 @@ fn sum_operations(count: OperationCount) -> u32 {
 }
 
 /// Creates operations from their numbers in the order of the fields.
-const fn operations(
-    [multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs]: [u32; 6],
+const fn operation_count(
+    [
+        multiplications,
+        additions,
+        fused_operations,
+        divisions,
+        square_roots,
+        sine_cosine_pairs,
+    ]: [u32; 6],
 ) -> OperationCount {
-    OperationCount { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
+    OperationCount {
+        multiplications,
+        additions,
+        fused_operations,
+        divisions,
+        square_roots,
+        sine_cosine_pairs,
+    }
 }
 
 /// The expected cost of forcing and derivative. A change of the model changes these numbers.
 const NONLINEAR_COST: [OperationCount; 2] =
-    [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
+    [operation_count([31, 34, 18, 0, 0, 0]), operation_count([557, 410, 319, 12, 4, 6])];
 const LINEAR_COST: [OperationCount; 2] =
-    [operations([348, 257, 241, 2, 0, 0]), operations([143, 135, 131, 0, 0, 0])];
-const NONLINEAR_MASS_SCALED: OperationCount = operations([753, 580, 474, 16, 4, 6]);
-const LINEAR_MASS_SCALED: OperationCount = operations([175, 161, 157, 0, 0, 0]);
-const OBSERVED_NONLINEAR: OperationCount = operations([410, 278, 209, 0, 0, 6]);
-const OBSERVED_LINEAR: OperationCount = operations([334, 267, 215, 0, 0, 0]);
+    [operation_count([348, 257, 241, 2, 0, 0]), operation_count([143, 135, 131, 0, 0, 0])];
+const NONLINEAR_MASS_SCALED_COST: OperationCount = operation_count([753, 580, 474, 16, 4, 6]);
+const LINEAR_MASS_SCALED_COST: OperationCount = operation_count([175, 161, 157, 0, 0, 0]);
+const NONLINEAR_OBSERVATION_COST: OperationCount = operation_count([410, 278, 209, 0, 0, 6]);
+const LINEAR_OBSERVATION_COST: OperationCount = operation_count([334, 267, 215, 0, 0, 0]);
 
 #[test]
 fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
@@ -220,24 +234,24 @@ fn the_cost_of_the_linear_right_hand_side_is_unchanged() {
 
 #[test]
 fn the_cost_of_mass_scaling_is_unchanged() {
-    let [nonlinear, linear] = [nonlinear_cost(CAPPED)[1], linear_cost(CAPPED)[1]];
+    let [nonlinear, linear] = [nonlinear_cost(CAPS)[1], linear_cost(CAPS)[1]];
     eprintln!("mass-scaled: nonlinear right-hand side {nonlinear:?}; linear {linear:?}");
-    assert_eq!([nonlinear, linear], [NONLINEAR_MASS_SCALED, LINEAR_MASS_SCALED]);
+    assert_eq!([nonlinear, linear], [NONLINEAR_MASS_SCALED_COST, LINEAR_MASS_SCALED_COST]);
 }
 
 #[test]
 fn the_cost_of_observation_is_unchanged() {
-    let observed = [
-        count_observation::<Nonlinear<CountingNumber>>(),
-        count_observation::<Linear<CountingNumber>>(),
+    let observation_costs = [
+        count_observation::<NonlinearModel<CountingNumber>>(),
+        count_observation::<LinearModel<CountingNumber>>(),
     ];
-    eprintln!("observed: nonlinear {:?}; linear {:?}", observed[0], observed[1]);
-    assert_eq!(observed, [OBSERVED_NONLINEAR, OBSERVED_LINEAR]);
+    eprintln!("observed: nonlinear {:?}; linear {:?}", observation_costs[0], observation_costs[1]);
+    assert_eq!(observation_costs, [NONLINEAR_OBSERVATION_COST, LINEAR_OBSERVATION_COST]);
 }
 
 #[test]
 fn a_linear_step_costs_less_than_a_nonlinear_one() {
-    for caps in [None, CAPPED] {
+    for caps in [None, CAPS] {
         // A step of RK4 has four derivatives, and the forcing at two new times.
         let step_operations = |[forcing, derivative]: [OperationCount; 2]| {
             4 * sum_operations(derivative) + 2 * sum_operations(forcing)

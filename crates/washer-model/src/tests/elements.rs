@@ -19,25 +19,27 @@ fn to_vector(values: &[f64]) -> [f64; 3] {
     [values[0], values[1], values[2]]
 }
 
-fn rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
+fn read_rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
     let rows = case[key].as_array().into_iter().flatten();
     rows.map(|row| row.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()).collect()
 }
 
 /// Reads the machine of a file of `tests/reference`, whose README explains the keys.
-pub(crate) fn machine(case: &Value) -> Machine {
-    let number = |key: &str| case[key].as_f64();
-    let mut machine =
-        paper_machine(number("unbalance_mass_kg").unwrap(), number("damping_n_s_per_m").unwrap());
+pub(crate) fn read_machine(case: &Value) -> Machine {
+    let read_number = |key: &str| case[key].as_f64();
+    let mut machine = paper_machine(
+        read_number("unbalance_mass_kg").unwrap(),
+        read_number("damping_n_s_per_m").unwrap(),
+    );
     for damper in &mut machine.dampers {
-        damper.friction_n = number("Ff").unwrap_or(0.0);
-        damper.friction_speed_m_per_s = number("vs").unwrap_or(damper.friction_speed_m_per_s);
+        damper.friction_n = read_number("Ff").unwrap_or(0.0);
+        damper.friction_speed_m_per_s = read_number("vs").unwrap_or(damper.friction_speed_m_per_s);
         damper.friction_linear_speed_m_per_s = Some(LINEAR_SPEED_M_PER_S);
     }
     for spring in &mut machine.springs {
-        spring.cubic_n_per_m3 = number("kc").unwrap_or(0.0);
+        spring.cubic_n_per_m3 = read_number("kc").unwrap_or(0.0);
     }
-    machine.stops = rows(case, "stops")
+    machine.stops = read_rows(case, "stops")
         .iter()
         .map(|row| BumpStop {
             tub_m: to_vector(&row[0..3]),
@@ -48,7 +50,7 @@ pub(crate) fn machine(case: &Value) -> Machine {
             softness_m: 1e-4,
         })
         .collect();
-    machine.bushings = rows(case, "bush")
+    machine.bushings = read_rows(case, "bush")
         .iter()
         .map(|row| Bushing {
             tub_m: to_vector(&row[0..3]),
@@ -57,11 +59,11 @@ pub(crate) fn machine(case: &Value) -> Machine {
             damping_n_s_per_m: to_vector(&row[9..12]),
         })
         .collect();
-    machine.further_unbalances = number("m2")
+    machine.further_unbalances = read_number("m2")
         .map(|mass_kg| Unbalance {
             mass_kg,
-            x_m: number("x2").unwrap(),
-            radius_m: number("r2").unwrap(),
+            x_m: read_number("x2").unwrap(),
+            radius_m: read_number("r2").unwrap(),
             angle_deg: 0.0,
         })
         .into_iter()
@@ -71,7 +73,7 @@ pub(crate) fn machine(case: &Value) -> Machine {
 
 /// Returns the reference machine that has elements of every kind.
 pub(super) fn with_every_element() -> Machine {
-    machine(&read_reference("elements_all.json"))
+    read_machine(&read_reference("elements_all.json"))
 }
 
 /// Computes the largest error of each method's history against a reference, relative to each
@@ -85,10 +87,10 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
         "cycloidal" => Spin::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s },
         other => panic!("{other}"),
     };
-    let point = prepare_point(machine(&case), spin, case["end_s"].as_f64().unwrap());
-    let at_rest = case["equilibrium_m_rad"].as_array().unwrap();
+    let point = prepare_point(read_machine(&case), spin, case["end_s"].as_f64().unwrap());
+    let reference_equilibrium = case["equilibrium_m_rad"].as_array().unwrap();
     for i in 0..COORDINATES {
-        let expected = at_rest[i].as_f64().unwrap();
+        let expected = reference_equilibrium[i].as_f64().unwrap();
         assert!((point.equilibrium[i] - expected).abs() < 1e-12, "{name}: q{}", i + 1);
     }
     let path = format!("{}/tests/reference/elements_{name}.csv", env!("CARGO_MANIFEST_DIR"));
@@ -97,12 +99,12 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
-    let channel = |name: &&str| {
+    let find_channel = |name: &&str| {
         let has_name =
             |channel: &Channel| format!("{}_{}", channel.name(), channel.unit()) == *name;
         Channel::ALL.into_iter().find(has_name)
     };
-    let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
+    let channels: Vec<Channel> = names.iter().filter_map(find_channel).collect();
     assert_eq!((names[0], channels.len()), ("time_s", 6));
     methods.map(|method| {
         let history = integrate_history(
@@ -178,11 +180,12 @@ fn heights_m(machine: Machine, start_m: f64, interval_s: f64, count: u32) -> Vec
     let end_s = interval_s * f64::from(count) * (1.0 + 1e-9);
     let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepare_point(machine, zero_spin, end_s);
-    let mut start = InitialDeviation::default();
-    start.deviations[0] = start_m;
-    start.deviations[2] = start_m;
+    let mut initial_deviation = InitialDeviation::default();
+    initial_deviation.deviations[0] = start_m;
+    initial_deviation.deviations[2] = start_m;
     let method = Method::rk4(2e-5);
-    let history = integrate_history(ModelKind::Nonlinear, &method, &point, &start, interval_s);
+    let history =
+        integrate_history(ModelKind::Nonlinear, &method, &point, &initial_deviation, interval_s);
     (0..history.len()).map(|k| history.instant_outputs(k).unwrap().deviations[0]).collect()
 }
 
@@ -213,7 +216,7 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
 #[test]
 fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
     let (mut machine, _) = heaving_machine();
-    let stiffness = 32_000.0;
+    let stiffness_n_per_m = 32_000.0;
     let friction_n = 40.0;
     let stroke_m = 0.012;
     machine.dampers = vec![Damper {
@@ -233,10 +236,11 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
     // The energy lost from amplitude a to b is k (a^2 - b^2) / 2 = F (a - s) + F (b - s), without
     // the last term if it is negative.
     let next_amplitude_m = |a: f64| {
-        let remaining = stiffness * a * a / 2.0 - friction_n * (a - stroke_m);
-        let c = remaining + friction_n * stroke_m;
-        let b = (-friction_n + (friction_n * friction_n + 2.0 * stiffness * c).sqrt()) / stiffness;
-        if b > stroke_m { b } else { (2.0 * remaining / stiffness).sqrt() }
+        let remaining_energy_j = stiffness_n_per_m * a * a / 2.0 - friction_n * (a - stroke_m);
+        let c = remaining_energy_j + friction_n * stroke_m;
+        let b = (-friction_n + (friction_n * friction_n + 2.0 * stiffness_n_per_m * c).sqrt())
+            / stiffness_n_per_m;
+        if b > stroke_m { b } else { (2.0 * remaining_energy_j / stiffness_n_per_m).sqrt() }
     };
     let mut expected = 0.02;
     assert!(extremes.len() > 12, "{}", extremes.len());
@@ -255,8 +259,8 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
 #[test]
 fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     let softness_m = 1e-3;
-    let mut staged = paper_machine(0.4, 80.0);
-    for damper in &mut staged.dampers {
+    let mut staged_machine = paper_machine(0.4, 80.0);
+    for damper in &mut staged_machine.dampers {
         damper.friction_n = 60.0;
         damper.free_stroke_m = 0.01;
         damper.free_stroke_softness_m = softness_m;
@@ -264,14 +268,16 @@ fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     }
     // The engagement h at rest, where delta = -s / 2.
     let engagement = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
-    let mut viscous = paper_machine(0.4, 80.0);
-    for damper in &mut viscous.dampers {
+    let mut viscous_machine = paper_machine(0.4, 80.0);
+    for damper in &mut viscous_machine.dampers {
         damper.damping_n_s_per_m += engagement * (300.0 + 60.0 / damper.friction_speed_m_per_s);
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
-    let [staged, viscous] = [staged, viscous].map(|machine| prepare_point(machine, spin(), 1.0));
-    assert!(staged.friction_speeds().is_empty());
-    let [computed, expected] = [staged, viscous].map(|point| point.matrices(0.3, 20.0, 1.0));
+    let [staged_machine, viscous_machine] =
+        [staged_machine, viscous_machine].map(|machine| prepare_point(machine, spin(), 1.0));
+    assert!(staged_machine.friction_speeds().is_empty());
+    let [computed, expected] =
+        [staged_machine, viscous_machine].map(|point| point.matrices(0.3, 20.0, 1.0));
     assert_eq!(computed.mass, expected.mass);
     let pairs = [(computed.damping, expected.damping), (computed.stiffness, expected.stiffness)];
     for (computed, expected) in pairs {
@@ -321,18 +327,19 @@ fn a_closed_stop_is_a_spring_in_parallel() {
 #[test]
 fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
     let machine = with_every_element();
-    let mut viscous = machine.clone();
-    for damper in &mut viscous.dampers {
+    let mut viscous_machine = machine.clone();
+    for damper in &mut viscous_machine.dampers {
         damper.damping_n_s_per_m += 4.0 * damper.friction_n / (PI * LINEAR_SPEED_M_PER_S);
         damper.friction_n = 0.0;
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
-    let [point, viscous] = [machine, viscous].map(|machine| prepare_point(machine, spin(), 1.0));
+    let [point, viscous_machine] =
+        [machine, viscous_machine].map(|machine| prepare_point(machine, spin(), 1.0));
     let matrices = |point: &Point| {
         let matrices = point.matrices(0.3, 20.0, 1.0);
         (matrices.mass, matrices.damping, matrices.stiffness, matrices.force)
     };
-    assert_eq!(matrices(&point), matrices(&viscous));
+    assert_eq!(matrices(&point), matrices(&viscous_machine));
 }
 
 #[test]
@@ -347,13 +354,15 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
         0.1,
     );
-    let difference = |size: f64| {
-        let start = InitialDeviation {
+    let force_difference = |size: f64| {
+        let initial_deviation = InitialDeviation {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
         };
         let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-            integrate_history(model, &Method::rk4(1e-4), &point, &start, 0.1).forces(0).unwrap()
+            integrate_history(model, &Method::rk4(1e-4), &point, &initial_deviation, 0.1)
+                .forces(0)
+                .unwrap()
         });
         assert!(nonlinear.stop_forces_n.iter().any(|force_n| *force_n > 100.0), "{nonlinear:?}");
         let all_forces = |forces: &crate::SuspensionForces| {
@@ -369,11 +378,14 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         let pairs = all_forces(&nonlinear).into_iter().zip(all_forces(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    let large = difference(1e-3);
-    let small_difference = difference(1e-4);
-    assert!(large > 1e-4, "{large}");
+    let large_difference = force_difference(1e-3);
+    let small_difference = force_difference(1e-4);
+    assert!(large_difference > 1e-4, "{large_difference}");
     // The difference is of second order: for a tenth of the motion it is a hundredth.
-    assert!((large / small_difference - 100.0).abs() < 10.0, "{large} {small_difference}");
+    assert!(
+        (large_difference / small_difference - 100.0).abs() < 10.0,
+        "{large_difference} {small_difference}"
+    );
 }
 
 #[test]
@@ -393,18 +405,30 @@ fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
             .map(|machine| prepare_point(machine, spin(), 1.5));
     let method = Method::rk4(2e-4);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-        let records = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
-        let alone = records(&[&without_friction])[0];
-        assert_eq!(alone, records(&[&with_friction_speed])[0], "{simd:?}");
-        let together = records(&[
+        let simulate_points =
+            |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
+        let single_record = simulate_points(&[&without_friction])[0];
+        assert_eq!(single_record, simulate_points(&[&with_friction_speed])[0], "{simd:?}");
+        let batch_records = simulate_points(&[
             &without_friction,
             &with_friction,
             &with_friction_speed,
             &with_friction,
             &without_friction,
         ]);
-        assert_eq!([together[0], together[2], together[4]], [alone; 3], "{simd:?}");
-        assert_eq!([together[1], together[3]], [records(&[&with_friction])[0]; 2], "{simd:?}");
-        assert!(together[1].amplitudes[0] < 0.8 * alone.amplitudes[0], "{together:?}");
+        assert_eq!(
+            [batch_records[0], batch_records[2], batch_records[4]],
+            [single_record; 3],
+            "{simd:?}"
+        );
+        assert_eq!(
+            [batch_records[1], batch_records[3]],
+            [simulate_points(&[&with_friction])[0]; 2],
+            "{simd:?}"
+        );
+        assert!(
+            batch_records[1].amplitudes[0] < 0.8 * single_record.amplitudes[0],
+            "{batch_records:?}"
+        );
     }
 }

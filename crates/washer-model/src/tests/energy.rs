@@ -34,37 +34,37 @@ fn distance(a: PlainVector, b: PlainVector) -> f64 {
 /// Computes the potential energy (J) at theta = 0: gravity, springs, bearings, flexure, stops,
 /// bushings (model page, section 3).
 fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
-    let tub = body_axes(q[4], q[5]);
-    let shaft = body_axes(q[6], q[7]);
+    let tub_axes = body_axes(q[4], q[5]);
+    let shaft_axes = body_axes(q[6], q[7]);
     let p_t = [0.0, q[0], q[1]];
     let p_s = [0.0, q[2], q[3]];
     // The drum's axes are those of the shaft, rotated by q9 about s2, then by q10.
     let drum_in_shaft = body_axes(q[8], q[9]);
-    let drum: [PlainVector; 3] =
-        std::array::from_fn(|k| position([0.0; 3], &shaft, drum_in_shaft[k]));
-    let hinge = position(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
+    let drum_axes: [PlainVector; 3] =
+        std::array::from_fn(|k| position([0.0; 3], &shaft_axes, drum_in_shaft[k]));
+    let hinge_position = position(p_s, &shaft_axes, [m.drum.hinge_x_m, 0.0, 0.0]);
     let drum_point = |x_m: f64, r_m: f64, angle_deg: f64| {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
-        position(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
+        position(hinge_position, &drum_axes, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
     };
     let mass_moments_kg_m = [
-        m.tub.mass_kg * position(p_t, &tub, [m.tub.centre_x_m, 0.0, 0.0])[1],
-        m.shaft.mass_kg * position(p_s, &shaft, [m.shaft.centre_x_m, 0.0, 0.0])[1],
+        m.tub.mass_kg * position(p_t, &tub_axes, [m.tub.centre_x_m, 0.0, 0.0])[1],
+        m.shaft.mass_kg * position(p_s, &shaft_axes, [m.shaft.centre_x_m, 0.0, 0.0])[1],
         m.drum.mass_kg * drum_point(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
     let unbalance_mass_moment =
         |u: &Unbalance| u.mass_kg * drum_point(u.x_m, u.radius_m, u.angle_deg)[1];
     let unbalance_mass_moments = m.unbalances().map(unbalance_mass_moment);
-    let mut energy = m.gravity_m_per_s2
+    let mut energy_j = m.gravity_m_per_s2
         * mass_moments_kg_m.into_iter().chain(unbalance_mass_moments).sum::<f64>();
     for s in &m.springs {
         let free_length_m = s.free_length_m.unwrap_or_else(|| distance(s.cabinet_m, s.tub_m));
-        let elongation = distance(position(p_t, &tub, s.tub_m), s.cabinet_m) - free_length_m;
-        energy += 0.5 * s.stiffness_n_per_m * elongation.powi(2);
-        energy += 0.25 * s.cubic_n_per_m3 * elongation.powi(4);
+        let elongation = distance(position(p_t, &tub_axes, s.tub_m), s.cabinet_m) - free_length_m;
+        energy_j += 0.5 * s.stiffness_n_per_m * elongation.powi(2);
+        energy_j += 0.25 * s.cubic_n_per_m3 * elongation.powi(4);
     }
     let displacement = |tub_point: PlainVector| -> PlainVector {
-        let cabinet_point = position(p_t, &tub, tub_point);
+        let cabinet_point = position(p_t, &tub_axes, tub_point);
         std::array::from_fn(|i| cabinet_point[i] - tub_point[i])
     };
     for s in &m.stops {
@@ -73,26 +73,26 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         let softness = s.softness_m;
         let w = depth.hypot(softness);
         let integral_of_w = depth * w + softness * softness * (depth / softness).asinh();
-        energy += 0.25 * s.stiffness_n_per_m * (depth * depth + integral_of_w);
+        energy_j += 0.25 * s.stiffness_n_per_m * (depth * depth + integral_of_w);
     }
     for b in &m.bushings {
         for (i, d) in displacement(b.tub_m).into_iter().enumerate() {
-            energy += 0.5 * b.stiffness_n_per_m[i] * d.powi(2);
-            energy += 0.25 * b.cubic_n_per_m3[i] * d.powi(4);
+            energy_j += 0.5 * b.stiffness_n_per_m[i] * d.powi(2);
+            energy_j += 0.25 * b.cubic_n_per_m3[i] * d.powi(4);
         }
     }
     let b = &m.bearings;
     for (x_m, stiffness) in
         [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
     {
-        let tub_centre = position(p_t, &tub, [x_m, 0.0, 0.0]);
-        let shaft_centre = position(p_s, &shaft, [x_m, 0.0, 0.0]);
+        let tub_centre = position(p_t, &tub_axes, [x_m, 0.0, 0.0]);
+        let shaft_centre = position(p_s, &shaft_axes, [x_m, 0.0, 0.0]);
         let deflection_squared =
             (shaft_centre[1] - tub_centre[1]).powi(2) + (shaft_centre[2] - tub_centre[2]).powi(2);
-        energy += 0.5 * stiffness * deflection_squared;
+        energy_j += 0.5 * stiffness * deflection_squared;
     }
     let phi = (q[8].cos() * q[9].cos()).acos();
-    energy + 0.5 * m.flexure.stiffness_n_m_per_rad * phi * phi
+    energy_j + 0.5 * m.flexure.stiffness_n_m_per_rad * phi * phi
 }
 
 /// Returns the depth (m) of a stop's tub point.
@@ -108,17 +108,17 @@ fn component_along(a: PlainVector, direction: PlainVector) -> f64 {
 /// Computes the power (W) that dampers, friction, stops and bushings dissipate.
 fn losses_w(
     m: &Machine,
-    at_rest: &[f64; COORDINATES],
+    rest_coordinates: &[f64; COORDINATES],
     q: &[f64; COORDINATES],
     u: &[f64; COORDINATES],
 ) -> f64 {
-    let axes_at_rest = body_axes(at_rest[4], at_rest[5]);
-    let tub = body_axes(q[4], q[5]);
-    let tub_point = |point: PlainVector| position([0.0, q[0], q[1]], &tub, point);
+    let rest_axes = body_axes(rest_coordinates[4], rest_coordinates[5]);
+    let tub_axes = body_axes(q[4], q[5]);
+    let tub_point = |point: PlainVector| position([0.0, q[0], q[1]], &tub_axes, point);
     // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
-    let angular_velocity: PlainVector = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
+    let angular_velocity: PlainVector = [u[5] * tub_axes[2][0], u[4], u[5] * tub_axes[2][2]];
     let velocity = |point: PlainVector| -> PlainVector {
-        let arm = position([0.0; 3], &tub, point);
+        let arm = position([0.0; 3], &tub_axes, point);
         let rotation: PlainVector = std::array::from_fn(|i| {
             let j = (i + 1) % 3;
             let k = (i + 2) % 3;
@@ -126,30 +126,33 @@ fn losses_w(
         });
         [rotation[0], rotation[1] + u[0], rotation[2] + u[1]]
     };
-    let mut losses = 0.0;
+    let mut dissipated_power_w = 0.0;
     for d in &m.dampers {
         let end = tub_point(d.tub_m);
-        let rest_m =
-            distance(position([0.0, at_rest[0], at_rest[1]], &axes_at_rest, d.tub_m), d.cabinet_m);
+        let rest_m = distance(
+            position([0.0, rest_coordinates[0], rest_coordinates[1]], &rest_axes, d.tub_m),
+            d.cabinet_m,
+        );
         let v =
             component_along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
-        losses += d.damping_n_s_per_m * v * v;
+        dissipated_power_w += d.damping_n_s_per_m * v * v;
         let stage_damping =
             d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
-        losses += engagement(d, distance(end, d.cabinet_m) - rest_m) * stage_damping * v * v;
+        dissipated_power_w +=
+            engagement(d, distance(end, d.cabinet_m) - rest_m) * stage_damping * v * v;
     }
     for s in &m.stops {
         let cabinet_point = tub_point(s.tub_m);
         let depth = depth_m(s, std::array::from_fn(|i| cabinet_point[i] - s.tub_m[i]));
         let v = component_along(velocity(s.tub_m), s.direction);
         let contact_share = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
-        losses += s.damping_n_s_per_m * contact_share * v * v;
+        dissipated_power_w += s.damping_n_s_per_m * contact_share * v * v;
     }
     for b in &m.bushings {
         let v = velocity(b.tub_m);
-        losses += (0..3).map(|i| b.damping_n_s_per_m[i] * v[i] * v[i]).sum::<f64>();
+        dissipated_power_w += (0..3).map(|i| b.damping_n_s_per_m[i] * v[i] * v[i]).sum::<f64>();
     }
-    losses
+    dissipated_power_w
 }
 
 /// Returns the share of friction and outer damping that acts at an elongation from rest (m).
@@ -158,8 +161,8 @@ fn engagement(damper: &Damper, elongation_m: f64) -> f64 {
     if stroke_m == 0.0 {
         return 1.0;
     }
-    let excess = (elongation_m * elongation_m - stroke_m * stroke_m) / (2.0 * stroke_m);
-    0.5 * (1.0 + excess / excess.hypot(damper.free_stroke_softness_m))
+    let excess_stroke_m = (elongation_m * elongation_m - stroke_m * stroke_m) / (2.0 * stroke_m);
+    0.5 * (1.0 + excess_stroke_m / excess_stroke_m.hypot(damper.free_stroke_softness_m))
 }
 
 /// Computes the kinetic energy (J) without spin, u M u / 2.
@@ -184,12 +187,17 @@ fn history_from_initial_velocity(
     let zero_spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepare_point(machine.clone(), zero_spin, end_s);
     // Velocities of 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s give motions of some 20 mm and 40 mrad.
-    let mut start = InitialDeviation::default();
+    let mut initial_deviation = InitialDeviation::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
-        (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
+        (initial_deviation.speeds[tub], initial_deviation.speeds[rotor]) = (speed, speed);
     }
-    let history =
-        integrate_history(ModelKind::Nonlinear, &Method::rk4(step_s), &point, &start, interval_s);
+    let history = integrate_history(
+        ModelKind::Nonlinear,
+        &Method::rk4(step_s),
+        &point,
+        &initial_deviation,
+        interval_s,
+    );
     let with_full_coordinates = |k| {
         let mut instant = history.instant_outputs(k).unwrap();
         instant.deviations = std::array::from_fn(|i| point.equilibrium[i] + instant.deviations[i]);
@@ -206,9 +214,9 @@ fn energies_j(step_s: f64) -> Vec<f64> {
     machine.dampers.clear();
     let coefficients = MachineCoefficients::new(&machine);
     let instants = history_from_initial_velocity(&machine, 10.0, step_s, 0.05);
-    let at_rest = potential_j(&machine, &equilibrium(&machine));
+    let rest_energy_j = potential_j(&machine, &equilibrium(&machine));
     let energy = |InstantOutputs { deviations: q, speeds: u, .. }: &InstantOutputs| {
-        potential_j(&machine, q) - at_rest + kinetic_j(&coefficients, q, u)
+        potential_j(&machine, q) - rest_energy_j + kinetic_j(&coefficients, q, u)
     };
     instants.iter().map(energy).collect()
 }
@@ -247,12 +255,13 @@ fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
             + kinetic_j(&coefficients, &instant.deviations, &instant.speeds)
     };
     let initial_energy_j = energy(&instants[0]);
-    let at_rest = equilibrium(&machine);
+    let rest_coordinates = equilibrium(&machine);
     let mut dissipated_j = 0.0;
     let mut max_error = 0.0_f64;
     for pair in instants.windows(2) {
-        let [before, after] = [&pair[0], &pair[1]]
-            .map(|instant| losses_w(&machine, &at_rest, &instant.deviations, &instant.speeds));
+        let [before, after] = [&pair[0], &pair[1]].map(|instant| {
+            losses_w(&machine, &rest_coordinates, &instant.deviations, &instant.speeds)
+        });
         dissipated_j += 0.5 * interval_s * (before + after);
         max_error = max_error.max(
             (initial_energy_j - energy(&pair[1]) - dissipated_j).abs()

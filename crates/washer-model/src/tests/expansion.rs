@@ -10,7 +10,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::{BodyAxes, MovingCoordinates, RADIAL_COMPONENTS};
 use crate::point::Point;
-use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
 use crate::{Channel, ModelKind, PointEquations, Spin};
 use lane_ode::{Dual, N, System};
 
@@ -23,7 +23,7 @@ type CoordinateVector = [f64; COORDINATES];
 struct LinearModelAtInstant {
     point: Point,
     t_s: f64,
-    model: Linear<f64>,
+    model: LinearModel<f64>,
     spin: SpinState<f64>,
 }
 
@@ -37,9 +37,9 @@ impl LinearModelAtInstant {
             add_skew_unbalance(&mut machine, rng);
         }
         let point = prepare_point(machine, spin, 10.0);
-        let model = Linear::splat(N(0.0), &point, Coupling::Springs);
+        let model = LinearModel::splat(N(0.0), &point, Coupling::Springs);
         let t_s = 10.0 * rng.f64();
-        let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
+        let spin = NonlinearModel::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
         Self { point, t_s, model, spin }
     }
 
@@ -86,15 +86,15 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
     let mut max_errors = [0.0_f64; 4];
     check_random_instants(21, |instant, _| {
         let SpinState { sin, cos, speed, acceleration, .. } = instant.spin;
-        let computed = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
+        let computed_matrices = instant.point.matrices(sin.0.atan2(cos.0), speed.0, acceleration.0);
         let [mut mass, mut damping, mut stiffness] = [[[0.0; COORDINATES]; COORDINATES]; 3];
         let mut force = ZERO_VECTOR;
         for j in 0..COORDINATES {
-            let mut unit = ZERO_VECTOR;
-            unit[j] = 1.0;
-            let [at_rest, by_a] = instant.residual(&ZERO_VECTOR, &ZERO_VECTOR, &unit);
-            let [_, by_u] = instant.residual(&ZERO_VECTOR, &unit, &ZERO_VECTOR);
-            let [_, by_q] = instant.residual(&unit, &ZERO_VECTOR, &ZERO_VECTOR);
+            let mut unit_vector = ZERO_VECTOR;
+            unit_vector[j] = 1.0;
+            let [at_rest, by_a] = instant.residual(&ZERO_VECTOR, &ZERO_VECTOR, &unit_vector);
+            let [_, by_u] = instant.residual(&ZERO_VECTOR, &unit_vector, &ZERO_VECTOR);
+            let [_, by_q] = instant.residual(&unit_vector, &ZERO_VECTOR, &ZERO_VECTOR);
             for i in 0..COORDINATES {
                 mass[i][j] = by_a[i];
                 damping[i][j] = by_u[i];
@@ -102,21 +102,24 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
                 force[i] = -at_rest[i];
             }
         }
-        let matrices =
-            [(computed.mass, mass), (computed.damping, damping), (computed.stiffness, stiffness)];
-        for (kind, (computed, expected)) in matrices.into_iter().enumerate() {
+        let matrices = [
+            (computed_matrices.mass, mass),
+            (computed_matrices.damping, damping),
+            (computed_matrices.stiffness, stiffness),
+        ];
+        for (kind, (computed_matrices, expected)) in matrices.into_iter().enumerate() {
             let max_magnitude = expected.iter().flatten().fold(0.0_f64, |m, a| m.max(a.abs()));
-            let difference = computed.iter().flatten().zip(expected.iter().flatten());
-            max_errors[kind] =
-                difference.fold(max_errors[kind], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
+            let entry_pairs = computed_matrices.iter().flatten().zip(expected.iter().flatten());
+            max_errors[kind] = entry_pairs
+                .fold(max_errors[kind], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
         }
         // The entries of F may be far below the weight, of which they are differences.
         let bodies = &instant.point.machine.bodies;
-        let weight = bodies.gravity.0 * bodies.rotor_mass.0;
-        let max_magnitude = force.iter().fold(weight, |m, a| m.max(a.abs()));
-        let difference = computed.force.iter().zip(&force);
+        let weight_n = bodies.gravity.0 * bodies.rotor_mass.0;
+        let max_magnitude = force.iter().fold(weight_n, |m, a| m.max(a.abs()));
+        let entry_pairs = computed_matrices.force.iter().zip(&force);
         max_errors[3] =
-            difference.fold(max_errors[3], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
+            entry_pairs.fold(max_errors[3], |m, (a, b)| m.max((a - b).abs() / max_magnitude));
     });
     let [m, c, k, f] = max_errors;
     eprintln!(
@@ -128,7 +131,7 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
 
 #[test]
 fn accelerations_solve_the_expanded_equations() {
-    let mut max_errors = 0.0_f64;
+    let mut max_error = 0.0_f64;
     check_random_instants(22, |instant, rng| {
         let mut q = random_vector(rng, 0.02);
         let u = random_vector(rng, 0.5);
@@ -145,11 +148,11 @@ fn accelerations_solve_the_expanded_equations() {
         let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
         for i in 0..COORDINATES {
             assert_eq!(dx[i].0, u[i]);
-            max_errors = max_errors.max((at_rest[i] + slope[i]).abs() / scale);
+            max_error = max_error.max((at_rest[i] + slope[i]).abs() / scale);
         }
     });
-    eprintln!("M q'' + C q' + K q - F: at most {max_errors:.1e} of the largest force");
-    assert!(max_errors < 1e-10, "{max_errors:e}");
+    eprintln!("M q'' + C q' + K q - F: at most {max_error:.1e} of the largest force");
+    assert!(max_error < 1e-10, "{max_error:e}");
 }
 
 #[test]
@@ -159,12 +162,13 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
     let mut max_rest_value = 0.0_f64;
     check_random_instants(23, |instant, rng| {
         let [q, u, a] = [0.02, 0.5, 20.0].map(|size| random_vector(rng, size));
-        let state = |first: &CoordinateVector, second: &CoordinateVector| -> [N<f64>; STATES] {
-            core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
-        };
+        let join_state =
+            |first: &CoordinateVector, second: &CoordinateVector| -> [N<f64>; STATES] {
+                core::array::from_fn(|i| N([first, second][i / COORDINATES][i % COORDINATES]))
+            };
         let forcing = instant.model.forcing(N(instant.t_s));
-        let (radial, channels) =
-            instant.model.observe(&forcing, &state(&q, &u), &state(&u, &a), true);
+        let (radial_position, channels) =
+            instant.model.observe(&forcing, &join_state(&q, &u), &join_state(&u, &a), true);
         let dual = |value: f64, slope: f64| N(Dual { value, slope });
         let dual_q = core::array::from_fn(|i| dual(instant.point.equilibrium[i], q[i]));
         let [u, a] = [u, a].map(|v| v.map(|v| dual(0.0, v)));
@@ -174,16 +178,17 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
         // Channels are deviations from equilibrium; the radial distance is not.
-        let channels_at_rest =
-            instant.point.channels_at_rest.into_iter().chain([0.0; RADIAL_COMPONENTS]);
-        let computed = channels.unwrap().into_iter().chain(radial);
+        let channel_rest_values =
+            instant.point.channel_rest_values.into_iter().chain([0.0; RADIAL_COMPONENTS]);
+        let computed = channels.unwrap().into_iter().chain(radial_position);
         let expected = axes
             .channels(&bodies, &motion)
             .into_iter()
             .chain(axes.radial_position(&bodies, &motion));
-        for ((computed, expected), channels_at_rest) in computed.zip(expected).zip(channels_at_rest)
+        for ((computed, expected), channel_rest_values) in
+            computed.zip(expected).zip(channel_rest_values)
         {
-            let order_zero = expected.value.0.value - channels_at_rest;
+            let order_zero = expected.value.0.value - channel_rest_values;
             let sampled_values = [
                 (computed.value.0, order_zero + expected.value.0.slope),
                 (computed.slope.0, expected.slope.0.value + expected.slope.0.slope),
@@ -212,7 +217,7 @@ fn outputs_of_order_zero_turn_with_the_drum() {
     // part of order zero.
     for (unbalance_mass_kg, centre_mm, front_um) in [(0.4, 4.960, 47.96), (0.7, 8.600, 56.86)] {
         let machine = paper_machine(unbalance_mass_kg, 140.0);
-        let mass =
+        let mass_kg =
             machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg + unbalance_mass_kg;
         let [drum_kg, drum_x_m] = [machine.drum.mass_kg, machine.drum.centre_x_m];
         let [hinge_x_m, front_x_m] = [machine.drum.hinge_x_m, machine.drum.front_x_m];
@@ -231,7 +236,7 @@ fn outputs_of_order_zero_turn_with_the_drum() {
             drum_kg * (drum_x_m - hinge_x_m) + unbalance_mass_kg * (unbalance.x_m - hinge_x_m);
         let radial_moment = unbalance_mass_kg * unbalance.radius_m;
         let centre_m =
-            (radial_moment * hinge_angle.cos() + axial_moment * hinge_angle.sin()) / mass;
+            (radial_moment * hinge_angle.cos() + axial_moment * hinge_angle.sin()) / mass_kg;
         let front_m = (front_x_m - hinge_x_m) * hinge_angle.sin();
         for (y, z, radius_m) in [
             (Channel::TotalCentreY, Channel::TotalCentreZ, centre_m),

@@ -20,7 +20,7 @@ fn simulate_both_models(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
 }
 
 /// Returns the largest ratio of amplitudes over the paper's channels.
-fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
+fn largest_ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
     let channels = [
         Channel::TubFrontY,
         Channel::TubFrontZ,
@@ -30,24 +30,27 @@ fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
         Channel::TubPitch,
     ];
     assert!(nonlinear.failure.is_none() && linear.failure.is_none());
-    let ratio = |c: Channel| nonlinear.amplitudes[c.index()] / linear.amplitudes[c.index()];
-    channels.into_iter().map(ratio).fold(0.0, f64::max)
+    let channel_ratio = |c: Channel| nonlinear.amplitudes[c.index()] / linear.amplitudes[c.index()];
+    channels.into_iter().map(channel_ratio).fold(0.0, f64::max)
 }
 
 #[test]
 fn the_linear_model_is_reliable_at_a_damping_of_140_but_not_at_100() {
     let records = simulate_both_models(&[(0.4, 140.0), (0.4, 100.0)]);
-    let [reliable_ratio, unreliable_ratio] = [&records[0], &records[1]].map(ratio);
-    let yaw = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
+    let [reliable_ratio, unreliable_ratio] = [&records[0], &records[1]].map(largest_ratio);
+    let yaw_amplitudes_rad = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
     eprintln!(
         "C = 140: ratio {reliable_ratio:.3}; C = 100: ratio {unreliable_ratio:.2}, yaw {:.1} mrad \
          nonlinear, {:.2} mrad linear",
-        1e3 * yaw[0],
-        1e3 * yaw[1]
+        1e3 * yaw_amplitudes_rad[0],
+        1e3 * yaw_amplitudes_rad[1]
     );
     assert!(reliable_ratio < 2.0, "{reliable_ratio}");
     assert!(unreliable_ratio >= 2.0, "{unreliable_ratio}");
-    assert!(yaw[0] > 0.060 && yaw[1] < 0.010, "{yaw:?}");
+    assert!(
+        yaw_amplitudes_rad[0] > 0.060 && yaw_amplitudes_rad[1] < 0.010,
+        "{yaw_amplitudes_rad:?}"
+    );
 }
 
 #[test]
@@ -58,7 +61,7 @@ fn the_boundary_rises_with_the_unbalance_mass() {
     let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
     let points: Vec<_> =
         brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
-    let ratios: Vec<_> = simulate_both_models(&points).iter().map(ratio).collect();
+    let ratios: Vec<_> = simulate_both_models(&points).iter().map(largest_ratio).collect();
     for ((m, [low, high]), pair) in brackets.into_iter().zip(ratios.chunks(2)) {
         eprintln!("m_u = {m} kg: ratio {:.2} at {low} N s/m, {:.2} at {high}", pair[0], pair[1]);
         assert!(pair[0] >= 2.0 && pair[1] < 2.0, "m_u = {m} kg: {pair:?}");

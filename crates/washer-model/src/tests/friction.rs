@@ -12,7 +12,7 @@ const TIMING: Timing = Timing { end_s: 12.0, window_s: [4.0, 10.0], checkpoints:
 
 /// Returns a machine whose dampers have friction. Without `fixed_speed_m_per_s`, their speed
 /// amplitudes follow from the motion.
-pub(crate) fn machine(
+pub(crate) fn machine_with_friction(
     unbalance_mass_kg: f64,
     frictions_n: [f64; 2],
     fixed_speed_m_per_s: Option<f64>,
@@ -31,7 +31,7 @@ pub(crate) fn machine(
     machine
 }
 
-fn prepared(machines: &[Machine]) -> Vec<Point> {
+fn prepare_points(machines: &[Machine]) -> Vec<Point> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 12.0 };
     let points: Vec<_> = machines.iter().map(|machine| (machine.clone(), spin.clone())).collect();
     prepare(Simd::widest(), &points, &TIMING).into_iter().map(Result::unwrap).collect()
@@ -40,8 +40,9 @@ fn prepared(machines: &[Machine]) -> Vec<Point> {
 #[test]
 fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let cases = [(0.4, [60.0, 60.0]), (0.2, [20.0, 60.0]), (0.9, [10.0, 0.0]), (0.5, [80.0, 81.0])];
-    let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
-    let points = prepared(&machines);
+    let machines =
+        cases.map(|(mass_kg, frictions_n)| machine_with_friction(mass_kg, frictions_n, None));
+    let points = prepare_points(&machines);
     let method = Method::rk4(2e-4);
     let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     let point_references: Vec<&Point> = points.iter().collect();
@@ -49,18 +50,27 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
         simulate_with(Simd::widest(), ModelKind::Linear, &method, &point_references, recorders);
     for ((point, reading), machine) in points.iter().zip(&readings).zip(&machines) {
         let speeds = reading.gauge_values(Gauge::DamperSpeed);
-        let factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
-        assert!(factor < 1.01, "{factor}: {:?} for {reading:?}", point.friction_speeds());
+        let speed_factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
+        assert!(
+            speed_factor < 1.01,
+            "{speed_factor}: {:?} for {reading:?}",
+            point.friction_speeds()
+        );
         // The speeds do not depend on the other points.
-        let alone = prepared(std::slice::from_ref(machine)).remove(0);
-        assert_eq!(alone.friction_speeds(), point.friction_speeds());
-        let count = machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
-        assert_eq!(point.friction_speeds().len(), count);
+        let single_point = prepare_points(std::slice::from_ref(machine)).remove(0);
+        assert_eq!(single_point.friction_speeds(), point.friction_speeds());
+        let friction_damper_count =
+            machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
+        assert_eq!(point.friction_speeds().len(), friction_damper_count);
     }
-    let point_with_fixed_speed = prepared(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
-    let factor =
+    let point_with_fixed_speed =
+        prepare_points(&[machine_with_friction(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
+    let speed_factor =
         point_with_fixed_speed.friction_speed_factor(ModelKind::Linear, &[0.1, 0.005]).unwrap();
-    assert!((factor - 5.0).abs() < 1e-12, "{factor}: below 4 v_s / pi friction is viscous");
+    assert!(
+        (speed_factor - 5.0).abs() < 1e-12,
+        "{speed_factor}: below 4 v_s / pi friction is viscous"
+    );
 }
 
 /// Friction dissipates almost all of the work of the unbalance's force. A change of the speed
@@ -69,23 +79,23 @@ fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
 #[test]
 fn own_speeds_near_a_resonance_are_a_fixed_point() {
     let machine_with = |fixed_speed_m_per_s: Option<f64>, friction_n: f64| {
-        let mut machine = machine(0.5, [friction_n; 2], fixed_speed_m_per_s);
+        let mut machine = machine_with_friction(0.5, [friction_n; 2], fixed_speed_m_per_s);
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 4.0);
         machine
     };
     let method = Method::rk4(2e-4);
     let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
     for friction_n in [45.0, 50.0, 55.0] {
-        let point = prepared(&[machine_with(None, friction_n)]).remove(0);
+        let point = prepare_points(&[machine_with(None, friction_n)]).remove(0);
         let speeds_m_per_s: Vec<f64> =
             point.friction_speeds().iter().map(|amplitude| amplitude.speed_m_per_s).collect();
         // Newton's method for both speeds, with finite differences between long runs.
-        let motion = |speeds: &[f64]| -> Vec<f64> {
+        let motion_reciprocals = |speeds: &[f64]| -> Vec<f64> {
             let mut machine = machine_with(Some(1.0), friction_n);
             for (damper, speed) in machine.dampers.iter_mut().zip(speeds) {
                 damper.friction_linear_speed_m_per_s = Some(*speed);
             }
-            let point = prepared(&[machine]).remove(0);
+            let point = prepare_points(&[machine]).remove(0);
             let (_, readings) =
                 simulate_with(Simd::widest(), ModelKind::Linear, &method, &[&point], recorders);
             let reciprocals =
@@ -94,23 +104,23 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
         };
         let mut reciprocals: Vec<f64> = speeds_m_per_s.iter().map(|speed| 1.0 / speed).collect();
         for _ in 0..4 {
-            let speeds = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 1.0 / x).collect() };
+            let to_speeds = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 1.0 / x).collect() };
             let residual = |x: &[f64]| -> [f64; 2] {
-                let motion = motion(&speeds(x));
-                [motion[0] - x[0], motion[1] - x[1]]
+                let reciprocals_at_x = motion_reciprocals(&to_speeds(x));
+                [reciprocals_at_x[0] - x[0], reciprocals_at_x[1] - x[1]]
             };
             let residual_here = residual(&reciprocals);
-            let column = |k: usize| {
+            let jacobian_column = |k: usize| {
                 let mut shifted_reciprocals = reciprocals.clone();
-                let step = 1e-3 * shifted_reciprocals[k];
-                shifted_reciprocals[k] += step;
+                let difference_step = 1e-3 * shifted_reciprocals[k];
+                shifted_reciprocals[k] += difference_step;
                 let shifted_residual = residual(&shifted_reciprocals);
                 [
-                    (shifted_residual[0] - residual_here[0]) / step,
-                    (shifted_residual[1] - residual_here[1]) / step,
+                    (shifted_residual[0] - residual_here[0]) / difference_step,
+                    (shifted_residual[1] - residual_here[1]) / difference_step,
                 ]
             };
-            let [[a, c], [b, d]] = [column(0), column(1)];
+            let [[a, c], [b, d]] = [jacobian_column(0), jacobian_column(1)];
             let determinant = a * d - b * c;
             reciprocals[0] -= (d * residual_here[0] - b * residual_here[1]) / determinant;
             reciprocals[1] -= (a * residual_here[1] - c * residual_here[0]) / determinant;
@@ -131,7 +141,7 @@ fn own_speeds_near_a_resonance_are_a_fixed_point() {
 /// method, with rows of `sweep run` at fixed speed amplitudes.
 #[test]
 fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
-    let mut machine = machine(0.514, [46.1; 2], None);
+    let mut machine = machine_with_friction(0.514, [46.1; 2], None);
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3.4);
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 265.13, ramp_s: 8.0 };
     let timing = Timing { end_s: 30.0, window_s: [10.0, 30.0], checkpoints: 0 };
@@ -146,8 +156,8 @@ fn own_speeds_of_dampers_that_move_together_are_a_fixed_point() {
 
 #[test]
 fn a_stuck_damper_has_the_least_speed_amplitude() {
-    let machine = machine(0.01, [120.0, 120.0], None);
-    let stuck_point = prepared(std::slice::from_ref(&machine)).remove(0);
+    let machine = machine_with_friction(0.01, [120.0, 120.0], None);
+    let stuck_point = prepare_points(std::slice::from_ref(&machine)).remove(0);
     let min_speed_m_per_s = 4.0 * machine.dampers[0].friction_speed_m_per_s / std::f64::consts::PI;
     for speed in stuck_point.friction_speeds() {
         assert!(
@@ -163,10 +173,10 @@ fn a_stuck_damper_has_the_least_speed_amplitude() {
 #[test]
 fn the_two_rates_of_an_overdamped_mode_have_one_shape() {
     let find_modes = |frictions_n: [f64; 2]| {
-        let point = prepared(&[machine(0.1, frictions_n, None)]).remove(0);
+        let point = prepare_points(&[machine_with_friction(0.1, frictions_n, None)]).remove(0);
         let modes = modes(&point, 0.0, 0.0).unwrap().modes;
-        let without_shapes = mode_roots(&point, 0.0, None).unwrap();
-        for (mode, motion) in modes.iter().zip(without_shapes) {
+        let roots_without_shapes = mode_roots(&point, 0.0, None).unwrap();
+        for (mode, motion) in modes.iter().zip(roots_without_shapes) {
             let error = motion.magnitude_rad_per_s / mode.magnitude_rad_per_s - 1.0;
             assert!(error.abs() < 1e-9, "{frictions_n:?}: {error:e}");
         }

@@ -148,9 +148,9 @@ pub(super) fn mass_matrix(
     let zeros = [N(0.0); COORDINATES];
     let mut matrix = [[0.0; COORDINATES]; COORDINATES];
     for j in 0..COORDINATES {
-        let mut unit = zeros;
-        unit[j] = N(1.0);
-        let [column, _] = equations(machine, spin, &q, &zeros, &unit);
+        let mut unit_acceleration = zeros;
+        unit_acceleration[j] = N(1.0);
+        let [column, _] = equations(machine, spin, &q, &zeros, &unit_acceleration);
         for i in 0..COORDINATES {
             matrix[i][j] = column[i].0;
         }

@@ -29,9 +29,10 @@ fn prepare_ramp_point(machine: Machine) -> Point {
 }
 
 /// Returns the least of each number over all instants.
-fn minima(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
-    let minima = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
-    instants.reduce(minima).unwrap()
+fn find_minima(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
+    let pairwise_minima =
+        |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+    instants.reduce(pairwise_minima).unwrap()
 }
 
 fn assert_close(quantity: &str, values: &[f64], expected: &[f64], tolerance: f64) {
@@ -77,8 +78,8 @@ fn compute_load(
     let dampers =
         machine.dampers.iter().map(|d| (d.cabinet_m, d.tub_m)).zip(&forces.damper_tensions_n);
     for ((cabinet_m, tub_m), tension_n) in springs.chain(dampers) {
-        let end = tub_point(tub_m);
-        let span: [f64; 3] = std::array::from_fn(|i| end[i] - cabinet_m[i]);
+        let tub_end_m = tub_point(tub_m);
+        let span: [f64; 3] = std::array::from_fn(|i| tub_end_m[i] - cabinet_m[i]);
         let length = span.iter().map(|s| s * s).sum::<f64>().sqrt();
         add_force(cabinet_m, span.map(|s| tension_n * s / length));
     }
@@ -116,7 +117,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let mut slip_margin_n = f64::INFINITY;
     let mut walk_margin_n = f64::INFINITY;
     let mut stop_forces_n = vec![0.0_f64; 3];
-    let mut contact_s = vec![0.0_f64; 3];
+    let mut contact_times_s = vec![0.0_f64; 3];
     let mut greatest_tensions_n = vec![0.0_f64; machine.dampers.len()];
     for k in first_instant..=last_instant {
         let forces = history.forces(k).unwrap();
@@ -132,23 +133,25 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         assert!((forces.slip_margin_n.unwrap() - slip_margin_now_n).abs() < 1e-9);
         slip_margin_n = slip_margin_n.min(slip_margin_now_n);
         // The moment is taken about the centre of the feet's loads; feet that lift have no load.
-        let loaded_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
-        let total_n: f64 = loaded_n.iter().sum();
-        let mean = |axis: usize| {
-            let feet = machine.feet.iter().zip(&loaded_n);
+        let positive_loads_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
+        let total_n: f64 = positive_loads_n.iter().sum();
+        let mean_coordinate = |axis: usize| {
+            let feet = machine.feet.iter().zip(&positive_loads_n);
             feet.map(|(foot, n)| foot.foot_m[axis] * n / total_n).sum::<f64>()
         };
-        let arm = |foot: &Foot| (foot.foot_m[0] - mean(0)).hypot(foot.foot_m[2] - mean(2));
+        let arm = |foot: &Foot| {
+            (foot.foot_m[0] - mean_coordinate(0)).hypot(foot.foot_m[2] - mean_coordinate(2))
+        };
         let arms: Vec<f64> = machine.feet.iter().map(arm).collect();
         let mean_square_arm_m2: f64 =
-            arms.iter().zip(&loaded_n).map(|(arm, n)| n / total_n * arm * arm).sum();
+            arms.iter().zip(&positive_loads_n).map(|(arm, n)| n / total_n * arm * arm).sum();
         let longest_arm_m = arms.iter().copied().fold(0.0, f64::max);
-        let moment = load[4] + mean(0) * load[2] - mean(2) * load[0];
+        let moment = load[4] + mean_coordinate(0) * load[2] - mean_coordinate(2) * load[0];
         let walk_margin_now_n =
             slip_margin_now_n - moment.abs() * longest_arm_m / mean_square_arm_m2;
         assert!((forces.walk_margin_n.unwrap() - walk_margin_now_n).abs() < 1e-6);
         walk_margin_n = walk_margin_n.min(walk_margin_now_n);
-        foot_loads_n = minima([foot_loads_n, loads_n].into_iter());
+        foot_loads_n = find_minima([foot_loads_n, loads_n].into_iter());
         for (greatest_n, now_n) in stop_forces_n.iter_mut().zip(&forces.stop_forces_n) {
             *greatest_n = greatest_n.max(*now_n);
         }
@@ -156,17 +159,19 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
             *greatest_n = greatest_n.max(now_n.abs());
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
-        for (contact_s, stop) in contact_s.iter_mut().zip(&machine.stops) {
+        for (contact_times_s, stop) in contact_times_s.iter_mut().zip(&machine.stops) {
             let stop_point = position([0.0, q[0], q[1]], &body_axes(q[4], q[5]), stop.tub_m);
             let length = stop.direction_length();
             let displacement_m: f64 =
                 (0..3).map(|i| (stop_point[i] - stop.tub_m[i]) * stop.direction[i] / length).sum();
-            *contact_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
+            *contact_times_s += if displacement_m > stop.clearance_m { INTERVAL_S } else { 0.0 };
         }
     }
-    let hit_stops =
-        stop_forces_n.iter().zip(&contact_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
-    assert!(hit_stops.count() >= 2, "{stop_forces_n:?} N, {contact_s:?} s");
+    let hit_stops = stop_forces_n
+        .iter()
+        .zip(&contact_times_s)
+        .filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
+    assert!(hit_stops.count() >= 2, "{stop_forces_n:?} N, {contact_times_s:?} s");
     let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::widest());
     assert_close("least load of foot", reading.gauge_values(Gauge::FootLoad), &foot_loads_n, 1e-2);
     assert_close("margin", reading.gauge_values(Gauge::SlipMargin), &[slip_margin_n], 1e-2);
@@ -200,7 +205,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     assert_close(
         "contact of stop",
         reading.gauge_values(Gauge::StopContact),
-        &contact_s,
+        &contact_times_s,
         40.0 * INTERVAL_S,
     );
     assert_eq!(read_gauges(&point, ModelKind::Nonlinear, Simd::Scalar), reading);
@@ -223,10 +228,11 @@ fn loads_of_the_linear_model_agree_with_its_history() {
         TIMING.window_s.map(|edge_s| (edge_s / INTERVAL_S).round() as usize);
     let forces: Vec<_> =
         (first_instant..=last_instant).map(|k| history.forces(k).unwrap()).collect();
-    let foot_loads_n = minima(forces.iter().map(|forces| forces.foot_loads_n.clone()));
-    let slip_margin_n = minima(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
+    let foot_loads_n = find_minima(forces.iter().map(|forces| forces.foot_loads_n.clone()));
+    let slip_margin_n =
+        find_minima(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
     let negated_stops_n =
-        minima(forces.iter().map(|forces| forces.stop_forces_n.iter().map(|n| -n).collect()));
+        find_minima(forces.iter().map(|forces| forces.stop_forces_n.iter().map(|n| -n).collect()));
     let stop_forces_n: Vec<f64> = negated_stops_n.iter().map(|negated_n| -negated_n).collect();
     let reading = read_gauges(&point, ModelKind::Linear, Simd::widest());
     let at_rest = history.forces(0).unwrap();
@@ -241,11 +247,12 @@ fn loads_of_the_linear_model_agree_with_its_history() {
     let tensions_n: Vec<f64> = dampers
         .map(|(damper, speed)| {
             let linear_speed = damper.friction_linear_speed_m_per_s.unwrap_or(f64::INFINITY);
-            let equivalent = 4.0 * damper.friction_n / (std::f64::consts::PI * linear_speed);
-            (damper.damping_n_s_per_m + equivalent) * speed
+            let equivalent_damping =
+                4.0 * damper.friction_n / (std::f64::consts::PI * linear_speed);
+            (damper.damping_n_s_per_m + equivalent_damping) * speed
         })
         .collect();
-    let negated_tensions_n = minima(
+    let negated_tensions_n = find_minima(
         forces.iter().map(|forces| forces.damper_tensions_n.iter().map(|n| -n.abs()).collect()),
     );
     let greatest_tensions_n: Vec<f64> = negated_tensions_n.iter().map(|n| -n).collect();
@@ -272,8 +279,8 @@ fn the_foot_loads_of_both_models_agree_for_small_motions() {
         &InitialDeviation::default(),
         0.1,
     );
-    let at_rest = compute_load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
-    let min_rest_load_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
+    let rest_load = compute_load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
+    let min_rest_load_n = feet.loads_n(&rest_load).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
         let reading = read_gauges(&point, model, Simd::widest());
         min_rest_load_n

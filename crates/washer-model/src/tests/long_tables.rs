@@ -8,10 +8,10 @@ use lane_ode::Simd;
 use crate::{Machine, Point, Spin, Timing, prepare};
 
 /// Returns a table at intervals of 1/64 s with a speed that rises and falls.
-fn table_spin(rows: usize) -> Spin {
-    let speed = |k: usize| 300.0 + 50.0 * ((k % 97) as f64 - 48.0) / 48.0;
-    let time_s = (0..rows).map(|k| k as f64 / 64.0).collect();
-    Spin::Table { time_s, speed_rpm: (0..rows).map(speed).collect() }
+fn table_spin(row_count: usize) -> Spin {
+    let speed_at = |k: usize| 300.0 + 50.0 * ((k % 97) as f64 - 48.0) / 48.0;
+    let time_s = (0..row_count).map(|k| k as f64 / 64.0).collect();
+    Spin::Table { time_s, speed_rpm: (0..row_count).map(speed_at).collect() }
 }
 
 const fn timing(end_s: f64, window_s: [f64; 2]) -> Timing {
@@ -26,16 +26,16 @@ fn prepare_points(spins: &[Spin], timing: &Timing) -> Vec<Point> {
 #[test]
 fn a_table_of_a_million_rows_is_prepared() {
     // Each of these computations would take hours if it grew with the square of the rows.
-    let rows = 1_000_000;
-    let spin = table_spin(rows);
-    let end_s = rows as f64 / 64.0;
+    let row_count = 1_000_000;
+    let spin = table_spin(row_count);
+    let end_s = row_count as f64 / 64.0;
     let greatest_rpm = spin.max_speed_rad_per_s(end_s) * 60.0 / core::f64::consts::TAU;
     assert!((greatest_rpm - 350.0).abs() < 1e-9, "{greatest_rpm}");
-    let midpoints_s = (0..rows).map(|k| (k as f64 + 0.5) / 64.0);
-    let mean_rpm = spin.speeds_rpm(midpoints_s).sum::<f64>() / rows as f64;
+    let midpoints_s = (0..row_count).map(|k| (k as f64 + 0.5) / 64.0);
+    let mean_rpm = spin.speeds_rpm(midpoints_s).sum::<f64>() / row_count as f64;
     assert!((mean_rpm - 300.0).abs() < 0.1, "{mean_rpm}");
     let point = &prepare_points(&[spin], &timing(end_s, [1.0, end_s]))[0];
-    assert_eq!((point.spin_segments.len(), point.segments.len()), (rows, rows));
+    assert_eq!((point.spin_segments.len(), point.segments.len()), (row_count, row_count));
 }
 
 #[test]
@@ -49,8 +49,8 @@ fn every_segment_lies_within_its_spin_segment() {
                 .spin_segments
                 .iter()
                 .rposition(|spin_segment| spin_segment.start_s.0 <= segment.start_s);
-            assert_eq!(Some(segment.spin_segment), expected, "{segment:?}");
-            let next_segment = point.spin_segments.get(segment.spin_segment + 1);
+            assert_eq!(Some(segment.spin_segment_index), expected, "{segment:?}");
+            let next_segment = point.spin_segments.get(segment.spin_segment_index + 1);
             assert!(
                 next_segment.is_none_or(|next_segment| segment.end_s <= next_segment.start_s.0)
             );

@@ -13,7 +13,7 @@ const INTERVAL_S: f64 = 2.5e-4;
 
 /// Returns a point that passes the resonances in four seconds, with a clearance so small that drum
 /// and tub overlap at times.
-fn point() -> Point {
+fn prepare_resonant_point() -> Point {
     let machine = Machine { radial_clearance_m: 0.4e-3, ..paper_machine(0.8, 120.0) };
     let spin =
         Spin::Table { time_s: vec![0.0, 1.0, 3.0, 4.0], speed_rpm: vec![0.0, 100.0, 420.0, 300.0] };
@@ -66,7 +66,7 @@ fn assert_close(quantity: &str, value: f64, expected: f64, tolerance: f64) {
 
 #[test]
 fn readings_agree_with_densely_sampled_histories() {
-    let point = point();
+    let point = prepare_resonant_point();
     let method = Method::rk4(2e-4);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (records, readings) =
@@ -121,37 +121,40 @@ fn readings_agree_with_densely_sampled_histories() {
 
 #[test]
 fn readings_do_not_depend_on_the_method() {
-    let point = point();
+    let point = prepare_resonant_point();
     let tolerance =
         Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000, longest_step_s: None };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let run = |method| {
+        let simulate_readings = |method| {
             simulate_with(Simd::widest(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
         };
-        let reference = run(Method::rk4(2e-4));
-        for reading in [run(Method::dopri5(tolerance)), run(Method::additive(tolerance))] {
+        let reference_reading = simulate_readings(Method::rk4(2e-4));
+        for reading in [
+            simulate_readings(Method::dopri5(tolerance)),
+            simulate_readings(Method::additive(tolerance)),
+        ] {
             let root_mean_squares =
-                [&reading, &reference].map(|reading| reading.root_mean_squares.unwrap());
+                [&reading, &reference_reading].map(|reading| reading.root_mean_squares.unwrap());
             root_mean_squares[0]
                 .iter()
                 .zip(root_mean_squares[1])
                 .for_each(|(value, expected)| assert_close("rms", *value, expected, 1e-4));
-            assert_eq!(reading.turns.len(), reference.turns.len());
+            assert_eq!(reading.turns.len(), reference_reading.turns.len());
             for (value, expected) in
-                reading.turns.iter().flatten().zip(reference.turns.iter().flatten())
+                reading.turns.iter().flatten().zip(reference_reading.turns.iter().flatten())
             {
                 assert_close("turn", *value, *expected, 1e-3);
             }
             assert_close(
                 "force",
                 reading.gauge_values(Gauge::CabinetForce)[0],
-                reference.gauge_values(Gauge::CabinetForce)[0],
+                reference_reading.gauge_values(Gauge::CabinetForce)[0],
                 1e-4,
             );
             assert_close(
                 "clash",
                 reading.gauge_values(Gauge::ClashTime)[0],
-                reference.gauge_values(Gauge::ClashTime)[0],
+                reference_reading.gauge_values(Gauge::ClashTime)[0],
                 1e-3,
             );
         }
@@ -160,14 +163,14 @@ fn readings_do_not_depend_on_the_method() {
 
 #[test]
 fn recorders_that_are_not_in_use_leave_no_readings() {
-    let point = point();
+    let point = prepare_resonant_point();
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
     let method = Method::capped(MethodKind::Capped0, 1e-3, caps);
-    let run = |recorders| {
+    let simulate_readings = |recorders| {
         simulate_with(Simd::widest(), ModelKind::Linear, &method, &[&point, &point], recorders)
     };
-    assert!(run(Recorders::default()).1.is_empty());
-    let (_, readings) = run(Recorders::with_gauge(Gauge::ClashTime));
+    assert!(simulate_readings(Recorders::default()).1.is_empty());
+    let (_, readings) = simulate_readings(Recorders::with_gauge(Gauge::ClashTime));
     assert_eq!(readings.len(), 2);
     for reading in readings {
         assert!(reading.root_mean_squares.is_none() && reading.turns.is_empty());

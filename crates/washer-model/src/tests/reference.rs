@@ -23,8 +23,8 @@ pub(crate) fn read_reference(file: &str) -> Value {
 }
 
 pub(crate) fn read_numbers<const K: usize>(value: &Value) -> [f64; K] {
-    let list = value.as_array().unwrap();
-    std::array::from_fn(|i| list[i].as_f64().unwrap())
+    let numbers = value.as_array().unwrap();
+    std::array::from_fn(|i| numbers[i].as_f64().unwrap())
 }
 
 /// Asserts that each entry of a matrix differs from the reference by less than `tolerance`,
@@ -56,7 +56,7 @@ pub(crate) fn assert_matrix(
 }
 
 /// Returns the paper's machine with the unbalance mass and damping of a case.
-pub(crate) fn machine(case: &Value) -> Machine {
+pub(crate) fn read_machine(case: &Value) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = case["unbalance_mass"].as_f64().unwrap();
     if let Some(damping) = case["damping"].as_f64() {
@@ -65,7 +65,7 @@ pub(crate) fn machine(case: &Value) -> Machine {
     machine
 }
 
-pub(crate) fn spin(case: &Value) -> SpinState<f64> {
+pub(crate) fn read_spin(case: &Value) -> SpinState<f64> {
     let number = |name: &str| N(case[name].as_f64().unwrap());
     SpinState::new(number("theta").sin_cos(), number("theta_dot"), number("theta_ddot"))
 }
@@ -73,13 +73,13 @@ pub(crate) fn spin(case: &Value) -> SpinState<f64> {
 #[test]
 fn val_accelerations_match_an_independent_right_hand_side() {
     for case in read_reference("rhs.json")["cases"].as_array().unwrap() {
-        let coefficients = MachineCoefficients::new(&machine(case));
+        let coefficients = MachineCoefficients::new(&read_machine(case));
         let [q, u] = ["q", "u"].map(|name| read_numbers::<COORDINATES>(&case[name]).map(N));
         let computed = nonlinear::accelerations(
             &coefficients,
             &Coupling::Springs,
             &Sag::new(&[0.0; COORDINATES]),
-            &spin(case),
+            &read_spin(case),
             &q,
             &u,
         );
@@ -102,7 +102,7 @@ fn val_accelerations_match_an_independent_right_hand_side() {
 fn val_equilibrium_matches_an_independent_solution() {
     for case in read_reference("equilibrium.json")["cases"].as_array().unwrap() {
         let (q, solved_lanes) =
-            equilibrium::solve_equilibrium(N(0.0), &MachineCoefficients::new(&machine(case)));
+            equilibrium::solve_equilibrium(N(0.0), &MachineCoefficients::new(&read_machine(case)));
         assert_eq!(solved_lanes & 1, 1);
         let expected: [f64; COORDINATES] = read_numbers(&case["q"]);
         for i in 0..COORDINATES {
@@ -120,10 +120,10 @@ fn val_equilibrium_matches_an_independent_solution() {
 #[test]
 fn val_linear_matrices_match_an_independent_expansion() {
     for case in read_reference("linear_matrices.json")["cases"].as_array().unwrap() {
-        let coefficients = MachineCoefficients::new(&machine(case));
+        let coefficients = MachineCoefficients::new(&read_machine(case));
         let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
         let point = linear::Linearisation { machine: &coefficients, q: &q }.run().remove(0);
-        let computed = point.matrices(&coefficients.bodies, &spin(case));
+        let computed = point.matrices(&coefficients.bodies, &read_spin(case));
         for (name, computed) in
             [("M", computed.mass), ("C", computed.damping), ("K", computed.stiffness)]
         {
@@ -143,9 +143,11 @@ fn val_eigenvalues_match_an_independent_solution() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     for case in read_reference("modes.json")["cases"].as_array().unwrap() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 1.0 };
-        let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
-        let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
-        let computed = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
+        let point =
+            prepare(Simd::Scalar, &[(read_machine(case), spin)], &timing).remove(0).unwrap();
+        let speed_rad_per_s = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
+        let computed =
+            modes(&point, case["theta"].as_f64().unwrap(), speed_rad_per_s).unwrap().modes;
         for (computed, expected) in computed.iter().zip(case["eigenvalues"].as_array().unwrap()) {
             let [re, im] = read_numbers(expected);
             let error = (computed.re_per_s - re).hypot(computed.im_rad_per_s - im) / re.hypot(im);
@@ -156,10 +158,13 @@ fn val_eigenvalues_match_an_independent_solution() {
                 computed.im_rad_per_s
             );
         }
-        let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
+        let highest_rad_per_s = highest_frequency_rad_per_s(&point, speed_rad_per_s).unwrap();
         let [re, im] = read_numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
         // The reference's highest frequency is that at theta = 0 only.
-        assert!((highest / f64::hypot(re, im) - 1.0).abs() < 2e-3, "{highest} against {im}");
+        assert!(
+            (highest_rad_per_s / f64::hypot(re, im) - 1.0).abs() < 2e-3,
+            "{highest_rad_per_s} against {im}"
+        );
     }
 }
 
@@ -193,7 +198,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
     let method = Method::rk4(2e-4);
     let [nonlinear, linear] =
         [ModelKind::Nonlinear, ModelKind::Linear].map(|m| simulate(simd, m, &method, &points));
-    let column = |name: &str| names.iter().position(|n| n == name).unwrap();
+    let column_index = |name: &str| names.iter().position(|n| n == name).unwrap();
     let mut compared_count = 0;
     for (i, row) in rows.iter().enumerate() {
         let mut largest_ratio = 0.0_f64;
@@ -207,8 +212,8 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
             for (prefix, computed) in
                 [("nonlinear", computed_nonlinear), ("linear", computed_linear)]
             {
-                let expected = row[column(&format!("{prefix}_{}", channel.name()))];
-                let is_regular = row[column("step_sensitivity")] < 1e-4;
+                let expected = row[column_index(&format!("{prefix}_{}", channel.name()))];
+                let is_regular = row[column_index("step_sensitivity")] < 1e-4;
                 if prefix == "linear" || is_regular {
                     let error = (computed - expected).abs() / expected;
                     assert!(
@@ -223,7 +228,7 @@ fn val_reliability_map_matches_that_of_an_independent_program() {
         }
         assert_eq!(
             largest_ratio < 2.0,
-            row[column("ratio_max")] < 2.0,
+            row[column_index("ratio_max")] < 2.0,
             "verdict at {:?}",
             &row[..2]
         );

@@ -163,7 +163,7 @@ impl SheetKeys {
             let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
             root.report_missing(MOVING_MASS, expected);
         } else if is_complete {
-            sheet.fill(&self.omitted_parameters, machine);
+            sheet.fill_omitted(&self.omitted_parameters, machine);
         }
         for parameter in &self.omitted_parameters {
             let Some(value) = parameter.get(machine, &no_spin()) else { continue };

@@ -53,7 +53,7 @@ impl Assumption {
 impl DataSheet {
     /// Sets the parameters that a file leaves out to their assumed values. Rules may read the
     /// results of other rules, without cycles, so that the passes end.
-    pub fn fill(&self, omitted: &[MachineParameter], machine: &mut Machine) {
+    pub fn fill_omitted(&self, omitted: &[MachineParameter], machine: &mut Machine) {
         let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         for _ in omitted {
             let previous_machine = machine.clone();

@@ -27,7 +27,7 @@ fn ramp_point() -> Point {
 #[test]
 fn the_tangent_map_agrees_with_differences_of_nearby_runs() {
     let point = ramp_point();
-    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
+    let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(&point);
     let entry_state = integrate_run(&point, STEP_S, [0.0, 1.8], &rest_state).end_state;
     // The interval contains the profile's kink.
     let crossing = forward_crossing([1.8, 2.2], None);
@@ -88,7 +88,7 @@ fn a_run_on_its_response_does_not_depart() {
 #[test]
 fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
     let point = ramp_point();
-    let rest_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
+    let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(&point);
     let ramp_peaks = integrate_run(&point, STEP_S, [0.0, 3.0], &rest_state).peaks;
     let state_at_1_s = integrate_run(&point, STEP_S, [0.0, 1.0], &rest_state);
     let window_peaks = integrate_run(&point, STEP_S, [1.0, 3.0], &state_at_1_s.end_state).peaks;
@@ -117,7 +117,7 @@ fn peaks_are_those_of_the_window_and_of_a_run_that_starts_on_its_response() {
 fn a_run_that_leaves_its_range_reports_the_time() {
     let point = ramp_point();
     // The suspension cannot stop a motion of this speed within the model's range.
-    let mut start_state = <Nonlinear<f64> as LaneModel<f64>>::rest_state(&point);
+    let mut start_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(&point);
     start_state[COORDINATES] = 1e4;
     let failure = integrate_run(&point, STEP_S, [0.0, 1.0], &start_state).failure.unwrap();
     assert!(failure.time_s > 0.0 && failure.time_s < 1.0, "{failure}");

@@ -7,12 +7,12 @@ use lane_ode::Cancel;
 
 /// Returns a random machine with the kinds of elements whose bits are set in `element_kinds`:
 /// friction, stops, stiffening springs, a bushing, a second unbalance.
-fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
+fn random_machine_with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
     let mut machine = random_machine(numbers);
-    let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+    let mut random_between = |low: f64, high: f64| low + (high - low) * numbers.f64();
     if element_kinds & 1 != 0 {
         for damper in &mut machine.dampers {
-            damper.friction_n = between(5.0, 80.0);
+            damper.friction_n = random_between(5.0, 80.0);
         }
     }
     if element_kinds & 2 != 0 {
@@ -20,33 +20,36 @@ fn with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
             machine.stops.push(BumpStop {
                 tub_m: [0.35, 0.0, 0.28 * side],
                 direction: [0.0, 0.1, side],
-                clearance_m: between(0.004, 0.02),
-                stiffness_n_per_m: between(1e4, 1.5e5),
-                damping_n_s_per_m: between(0.0, 400.0),
-                softness_m: between(1e-4, 1e-3),
+                clearance_m: random_between(0.004, 0.02),
+                stiffness_n_per_m: random_between(1e4, 1.5e5),
+                damping_n_s_per_m: random_between(0.0, 400.0),
+                softness_m: random_between(1e-4, 1e-3),
             });
         }
     }
     if element_kinds & 4 != 0 {
-        machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = between(1e5, 3e6));
+        machine
+            .springs
+            .iter_mut()
+            .for_each(|spring| spring.cubic_n_per_m3 = random_between(1e5, 3e6));
     }
     if element_kinds & 8 != 0 {
         machine.bushings.push(Bushing {
             tub_m: [0.45, 0.0, 0.0],
-            stiffness_n_per_m: [0.0, between(500.0, 2e3), between(500.0, 2e3)],
-            cubic_n_per_m3: [0.0, 1e7, between(5e6, 2e7)],
+            stiffness_n_per_m: [0.0, random_between(500.0, 2e3), random_between(500.0, 2e3)],
+            cubic_n_per_m3: [0.0, 1e7, random_between(5e6, 2e7)],
             damping_n_s_per_m: [0.0, 10.0, 15.0],
         });
     }
     if element_kinds & 16 != 0 {
-        let mass_kg = between(0.05, 0.4);
-        let x_m = between(0.1, 0.3);
+        let mass_kg = random_between(0.05, 0.4);
+        let x_m = random_between(0.1, 0.3);
         machine.further_unbalances.push(Unbalance { mass_kg, x_m, radius_m: 0.18, angle_deg: 0.0 });
     }
     machine
 }
 
-fn bits(result: &TurnResult) -> Vec<u64> {
+fn result_bits(result: &TurnResult) -> Vec<u64> {
     let mut numbers: Vec<f64> = result.end_state.to_vec();
     if let Some(record) = &result.record {
         numbers.extend(record.monodromy.iter().flatten().map(|entry| entry.0));
@@ -68,7 +71,9 @@ fn turns_do_not_depend_on_other_lanes() {
     for number in 0..number_from_env("MACHINES", 64) {
         let element_kinds = number % 32;
         let points: Vec<Point> = (0..1 + numbers.usize(..4))
-            .map(|_| prepared(with_elements(element_kinds, &mut numbers), 100.0))
+            .map(|_| {
+                prepare_at_speed(random_machine_with_elements(element_kinds, &mut numbers), 100.0)
+            })
             .collect();
         let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
         let speed_rpm = 60.0 + 400.0 * numbers.f64();
@@ -82,9 +87,9 @@ fn turns_do_not_depend_on_other_lanes() {
                 _ => settings.continuation_setup(speed_rpm).unwrap(),
             };
             let equilibrium = settings.point.equilibrium();
-            let size = 0.02 * numbers.f64();
+            let deviation_size = 0.02 * numbers.f64();
             let start_state = core::array::from_fn(|i| {
-                let offset = size * (2.0 * numbers.f64() - 1.0);
+                let offset = deviation_size * (2.0 * numbers.f64() - 1.0);
                 if i < 2 || (4..6).contains(&i) {
                     equilibrium[i] + offset
                 } else if i < COORDINATES {
@@ -97,13 +102,15 @@ fn turns_do_not_depend_on_other_lanes() {
         }
         let results = compute_turns(&requests, Cancel::Never);
         for (request, result) in requests.iter().zip(&results) {
-            let alone = compute_turns(core::slice::from_ref(request), Cancel::Never).remove(0);
-            let key = request.setup.batch_key();
+            let single_result =
+                compute_turns(core::slice::from_ref(request), Cancel::Never).remove(0);
+            let batch_key = request.setup.batch_key();
             assert!(
-                bits(&alone) == bits(result),
-                "machine {number}, elements {element_kinds:b}, {key:?}, recorded {}: {:?} {:?}",
+                result_bits(&single_result) == result_bits(result),
+                "machine {number}, elements {element_kinds:b}, {batch_key:?}, recorded {}: {:?} \
+                 {:?}",
                 request.is_recorded,
-                alone.end_state,
+                single_result.end_state,
                 result.end_state
             );
         }
