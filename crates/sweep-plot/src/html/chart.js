@@ -29,9 +29,9 @@ function createChart(host, spec, name, pick = () => {}) {
   // The height of the pointer, px from the figure's top; null if the cursor was moved by keys.
   let pointerY = null;
 
-  const find = appendTemplate(host, "chart");
+  const findElement = appendTemplate(host, "chart");
   const [picker, figure, tip, legend, announcement] = [".controls", ".figure", ".tip", ".legend",
-    ".unseen"].map(find);
+    ".unseen"].map(findElement);
   figure.ariaLabel = `${name}. Arrow keys read values, plus and minus zoom, 0 resets.`;
   if (spec.panels.length > 1) {
     picker.append(element("legend", {}, "Show"), ...spec.panels.map((panel) => {
@@ -44,10 +44,11 @@ function createChart(host, spec, name, pick = () => {}) {
   }
 
   // Labels of marks stand above the panels, not on the curves.
-  const strip = spec.marks.length ? 66 : 0;
-  const shown = () => spec.panels.filter((panel) => panel.shown);
-  const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART_MARGINS.gap, 0);
-  const height = () => CHART_MARGINS.top + strip + heights() + CHART_MARGINS.bottom;
+  const markStripHeight = spec.marks.length ? 66 : 0;
+  const shownPanels = () => spec.panels.filter((panel) => panel.shown);
+  const panelsHeight = () => shownPanels()
+    .reduce((sum, panel) => sum + panel.height + CHART_MARGINS.gap, 0);
+  const height = () => CHART_MARGINS.top + markStripHeight + panelsHeight() + CHART_MARGINS.bottom;
   const { request, canvas } = createSurface(figure, height, paint);
   const area = () => ({
     left: CHART_MARGINS.left,
@@ -72,7 +73,7 @@ function createChart(host, spec, name, pick = () => {}) {
   }
 
   // Returns the indices of a grid's points in the view, and one beyond on each side.
-  function visible(grid) {
+  function visibleRange(grid) {
     const from = Math.max(lowerBound(grid, fromCoordinate(view[0])) - 1, 0);
     return [from, Math.min(lowerBound(grid, fromCoordinate(view[1])) + 1, grid.length - 1)];
   }
@@ -85,7 +86,7 @@ function createChart(host, spec, name, pick = () => {}) {
       [low, high] = [Math.min(low, value), Math.max(high, value)];
     };
     for (const series of panel.series) {
-      const [from, to] = visible(spec.grids[series.grid]);
+      const [from, to] = visibleRange(spec.grids[series.grid]);
       for (const values of [series.y, series.low, series.high]) {
         values?.subarray(from, to + 1).forEach(extendRange);
       }
@@ -100,32 +101,34 @@ function createChart(host, spec, name, pick = () => {}) {
   // Returns whether a panel has a point of a line, a dot or a star.
   function hasValues(panel) {
     const isShown = (y) => Number.isFinite(y) && (!panel.log || y > 0);
-    const ofSeries = ({ y, low, high }) => [y, low, high].some((values) => values?.some(isShown));
-    return panel.stars.length > 0 || panel.series.some(ofSeries);
+    const hasSeriesValues = ({ y, low, high }) => [y, low, high]
+      .some((values) => values?.some(isShown));
+    return panel.stars.length > 0 || panel.series.some(hasSeriesValues);
   }
 
   function paint(context) {
-    const box = { ...area(), top: CHART_MARGINS.top + strip };
+    const box = { ...area(), top: CHART_MARGINS.top + markStripHeight };
     drawMarkLabels(context, box);
     context.lineJoin = "round";
-    const panels = shown();
+    const panels = shownPanels();
     for (const panel of panels) {
       box.height = panel.height;
       const [low, high] = yRange(panel);
       const scale = (y) => (panel.log ? Math.log(y) : y);
-      const part = (y) => (scale(y) - scale(low)) / (scale(high) - scale(low));
+      const heightFraction = (y) => (scale(y) - scale(low)) / (scale(high) - scale(low));
       const { top } = box;
-      const atY = (y) => top + panel.height * (1 - part(y));
+      const atY = (y) => top + panel.height * (1 - heightFraction(y));
       const [right, bottom] = [box.left + box.width, top + panel.height];
-      const words = panel === panels.at(-1) && { words: spec.xWords, unit: spec.xUnit };
+      const axisTitle = panel === panels.at(-1) && { words: spec.xWords, unit: spec.xUnit };
       const range = view.map(fromCoordinate);
-      drawAxes(context, box, { range, at: atX, ticks: spec.xTicks, ...words },
+      drawAxes(context, box, { range, at: atX, ticks: spec.xTicks, ...axisTitle },
         { ...panel, range: [low, high], at: atY }, true);
       context.save();
       context.beginPath();
       context.rect(box.left, top, box.width, panel.height);
       context.clip();
-      for (const [ranges, colour] of [[spec.shades, SHADE], [panel.mixed, MIXED]]) {
+      const shades = [[spec.shades, UNSTABLE_COLOUR], [panel.mixed, BOTH_SIDES_COLOUR]];
+      for (const [ranges, colour] of shades) {
         context.fillStyle = colour;
         for (const [from, to] of ranges) {
           context.fillRect(atX(from), top, Math.max(atX(to) - atX(from), 1), panel.height);
@@ -160,12 +163,12 @@ function createChart(host, spec, name, pick = () => {}) {
 
   // Draws the labels of marks. A label that would cover the label before it is moved to the right.
   function drawMarkLabels(context, { left, top, width }) {
-    let nextFree = -Infinity;
+    let nextFreeX = -Infinity;
     for (const [x, label] of spec.marks) {
       const markX = atX(x);
       if (markX < left || markX > left + width) continue;
-      const labelX = Math.max(markX, nextFree);
-      nextFree = labelX + 15;
+      const labelX = Math.max(markX, nextFreeX);
+      nextFreeX = labelX + 15;
       drawLine(context, markX, top, labelX, top - 8, [], themeColour("muted"));
       write(context, label, labelX + 4, top - 11, { align: "left", size: 12, isVertical: true });
     }
@@ -175,7 +178,7 @@ function createChart(host, spec, name, pick = () => {}) {
   function drawSeries(context, series, atY, box) {
     const dots = new Path2D();
     const grid = spec.grids[series.grid];
-    const [from, to] = visible(grid);
+    const [from, to] = visibleRange(grid);
     context.strokeStyle = context.fillStyle = lineColour(series.colour);
     if (series.low) {
       context.beginPath();
@@ -210,8 +213,8 @@ function createChart(host, spec, name, pick = () => {}) {
         if (run.length > 1) continue;
       }
       for (const [x, ys] of run) ys.forEach((y) => {
-        const part = [(x - box.left) / box.width, (y - box.top) / box.height];
-        if (!part.every((at) => at >= 0 && at <= 1)) return;
+        const boxFractions = [(x - box.left) / box.width, (y - box.top) / box.height];
+        if (!boxFractions.every((at) => at >= 0 && at <= 1)) return;
         dots.moveTo(x, y);
         dots.arc(x, y, series.dots ? series.width / 2 : 3, 0, 2 * Math.PI);
       });
@@ -228,30 +231,32 @@ function createChart(host, spec, name, pick = () => {}) {
   // Updates the legend of lines and marks.
   function updateLegend() {
     const entries = new Map();
-    const add = (words, style = null) => {
+    const addEntry = (words, style = null) => {
       if (!entries.has(words)) entries.set(words, legendEntry([style, words]));
     };
-    for (const panel of shown()) {
-      for (const series of panel.series) add(series.name || panel.words, symbolStyle(series));
+    for (const panel of shownPanels()) {
+      for (const series of panel.series) addEntry(series.name || panel.words, symbolStyle(series));
     }
-    const overlappingPair = shown().map((panel) => panel.series.slice(-2))
+    const overlappingPair = shownPanels().map((panel) => panel.series.slice(-2))
       .find((series) => series.at(-1)?.alpha < 1);
     if (overlappingPair) {
       const [under, over] = [overlappingPair[0], overlappingPair.at(-1)]
         .map((series) => lineColour(series.colour));
-      const mixed = `${over} ${100 * overlappingPair.at(-1).alpha}%, ${under}`;
-      const line = `height:0;border-top:3px solid color-mix(in srgb, ${mixed})`;
-      add("both, one over the other", line);
+      const mixedColours = `${over} ${100 * overlappingPair.at(-1).alpha}%, ${under}`;
+      const lineStyle = `height:0;border-top:3px solid color-mix(in srgb, ${mixedColours})`;
+      addEntry("both, one over the other", lineStyle);
     }
-    for (const [, meaning] of shown().flatMap((panel) => panel.levels)) {
-      add(meaning, "height:0;border-top:2px dotted currentColor");
+    for (const [, meaning] of shownPanels().flatMap((panel) => panel.levels)) {
+      addEntry(meaning, "height:0;border-top:2px dotted currentColor");
     }
-    if (shown().some((panel) => panel.mixed.length)) {
-      add("both: reliable and unreliable points", `background:${MIXED}`);
+    if (shownPanels().some((panel) => panel.mixed.length)) {
+      addEntry("both: reliable and unreliable points", `background:${BOTH_SIDES_COLOUR}`);
     }
-    if (spec.marks.length) add(spec.markMeaning, "height:0;border-top:2px dashed currentColor");
-    if (spec.shades.length) add(spec.shadeMeaning, `background:${SHADE}`);
-    if (shown().some((panel) => panel.stars.length)) add("★ resonance speed");
+    if (spec.marks.length) {
+      addEntry(spec.markMeaning, "height:0;border-top:2px dashed currentColor");
+    }
+    if (spec.shades.length) addEntry(spec.shadeMeaning, `background:${UNSTABLE_COLOUR}`);
+    if (shownPanels().some((panel) => panel.stars.length)) addEntry("★ resonance speed");
     legend.replaceChildren(...entries.values());
   }
 
@@ -262,10 +267,10 @@ function createChart(host, spec, name, pick = () => {}) {
       announcement.textContent = "";
       return;
     }
-    const x = `${spec.xWords} ${formatSignificant(cursor)} ${spec.xUnit}`.trim();
+    const xText = `${spec.xWords} ${formatSignificant(cursor)} ${spec.xUnit}`.trim();
     const rows = [];
-    const words = [x];
-    for (const panel of shown()) {
+    const readoutTexts = [xText];
+    for (const panel of shownPanels()) {
       // Two curves of a panel share a row, in which the legend's symbols identify them.
       const sharesRow = spec.panels.length > 1 && panel.series.length <= 2;
       for (const group of sharesRow ? [panel.series] : panel.series.map((series) => [series])) {
@@ -273,7 +278,7 @@ function createChart(host, spec, name, pick = () => {}) {
         const cells = group.map((series) => {
           const value = formatSignificant(series.y[nearest(spec.grids[series.grid], cursor)]);
           const name = sharesRow && series.name ? `${title}, ${series.name}` : title;
-          words.push(`${name}: ${value} ${panel.unit}`.trim());
+          readoutTexts.push(`${name}: ${value} ${panel.unit}`.trim());
           const columnSpan = sharesRow && group.length === 1 ? 2 : null;
           const attributes = { "data-name": name, colspan: columnSpan };
           return element("td", attributes, swatch(symbolStyle(series)), value);
@@ -282,8 +287,8 @@ function createChart(host, spec, name, pick = () => {}) {
       }
     }
     tip.dataset.x = cursor;
-    tip.replaceChildren(element("p", {}, x), table([], rows));
-    announcement.textContent = words.join("; ");
+    tip.replaceChildren(element("p", {}, xText), table([], rows));
+    announcement.textContent = readoutTexts.join("; ");
     // The box stays within the visible part of a figure that is higher than the window.
     const bounds = figure.getBoundingClientRect();
     const visibleHeights = [
@@ -299,10 +304,10 @@ function createChart(host, spec, name, pick = () => {}) {
     showReadout();
   }
 
-  const mainGrid = () => spec.grids[shown()[0]?.series[0]?.grid ?? 0];
-  const pxOf = (event) => event.clientX - canvas.getBoundingClientRect().left;
-  function read(event) {
-    const px = pxOf(event);
+  const mainGrid = () => spec.grids[shownPanels()[0]?.series[0]?.grid ?? 0];
+  const pointerX = (event) => event.clientX - canvas.getBoundingClientRect().left;
+  function moveCursor(event) {
+    const px = pointerX(event);
     if (px < area().left || px > area().left + area().width) return;
     const grid = mainGrid();
     setCursor(grid[nearest(grid, toX(px))], event.clientY - canvas.getBoundingClientRect().top);
@@ -317,16 +322,16 @@ function createChart(host, spec, name, pick = () => {}) {
       moveView(from, (-by / area().width) * (from[1] - from[0]), fullView),
     ),
     zoom: (factor, event) => setView(zoomView(view, factor,
-      event ? toCoordinate(toX(pxOf(event))) : centre(), fullView)),
-    read,
+      event ? toCoordinate(toX(pointerX(event))) : centre(), fullView)),
+    read: moveCursor,
     letGo: () => setCursor(null),
     pick(event) {
-      read(event);
+      moveCursor(event);
       if (cursor !== null) pick(cursor);
     },
     key(event) {
       const grid = mainGrid();
-      const [from, to] = visible(grid);
+      const [from, to] = visibleRange(grid);
       const stride = (event.shiftKey ? 10 : 1) * Math.max(1, Math.round((to - from) / 200));
       const current = cursor === null ? Math.round((from + to) / 2) : nearest(grid, cursor);
       const step = { ArrowLeft: -stride, ArrowRight: stride }[event.key];
@@ -351,11 +356,16 @@ function nearest(sorted, value) {
 function decodeChart(chart) {
   const decodeCurve = (values) => (typeof values === "string"
     ? decodeFloats(values) : decodeQuantised(values));
-  const curve = (values) => values && decodeCurve(values);
-  const series = (one) => ({ ...one, y: curve(one.y), low: curve(one.low), high: curve(one.high) });
+  const decodeIfGiven = (values) => values && decodeCurve(values);
+  const decodeSeries = (series) => ({
+    ...series,
+    y: decodeIfGiven(series.y),
+    low: decodeIfGiven(series.low),
+    high: decodeIfGiven(series.high),
+  });
   return {
     ...chart,
-    grids: chart.grids.map(curve),
-    panels: chart.panels.map((panel) => ({ ...panel, series: panel.series.map(series) })),
+    grids: chart.grids.map(decodeIfGiven),
+    panels: chart.panels.map((panel) => ({ ...panel, series: panel.series.map(decodeSeries) })),
   };
 }

@@ -20,15 +20,15 @@ const decodeDoubles = (text) => new Float64Array(decode(text).buffer);
 
 // Decodes 16-bit integers times their unit; the least integer means no value.
 function decodeQuantised([text, unit]) {
-  const whole = new Int16Array(decode(text).buffer);
-  return Float32Array.from(whole, (value) => (value === -32768 ? NaN : value * unit));
+  const integers = new Int16Array(decode(text).buffer);
+  return Float32Array.from(integers, (value) => (value === -32768 ? NaN : value * unit));
 }
 
 function formatSignificant(value, digits = 4) {
   if (value === undefined || value === null || Number.isNaN(value)) return "–";
   if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e7 || size < 1e-4) return value.toExponential(digits - 1);
+  const magnitude = Math.abs(value);
+  if (magnitude >= 1e7 || magnitude < 1e-4) return value.toExponential(digits - 1);
   return String(Number(value.toPrecision(digits)));
 }
 
@@ -39,10 +39,10 @@ const DATA = JSON.parse(document.getElementById("data").textContent);
 // axis, from sparse to dense.
 function ticks(low, high, count, sets) {
   if (!(high > low)) return [];
-  const within = ([value]) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9);
+  const isWithin = ([value]) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9);
   let chosenTicks = [];
   for (const set of sets ?? []) {
-    const visibleTicks = set.filter(within);
+    const visibleTicks = set.filter(isWithin);
     if (chosenTicks.length >= 2 && visibleTicks.length > Math.max(count, 2) + 1) break;
     chosenTicks = visibleTicks;
   }
@@ -220,8 +220,8 @@ function drawAxes(context, { left, top, width, height }, x, y, ruled) {
 }
 
 // The colour of cells or ranges with points on both sides of a limit.
-const MIXED = DATA.both;
-const SHADE = DATA.shade;
+const BOTH_SIDES_COLOUR = DATA.both;
+const UNSTABLE_COLOUR = DATA.shade;
 
 // Connects pointer, keys and buttons (for readers without a wheel) to a figure. `actions` has
 // view(), isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor,

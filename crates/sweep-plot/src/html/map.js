@@ -102,12 +102,12 @@ function createMap(host, data, panel) {
     if (!layer) {
       const { values, words } = codes.status;
       return (cell) => (values[cell] === SEVERAL_WORDS
-        ? MIXED : data.palettes.kinds[words[values[cell]]] ?? null);
+        ? BOTH_SIDES_COLOUR : data.palettes.kinds[words[values[cell]]] ?? null);
     }
     const { values, factor } = columns[layer.column];
     return (cell) => {
       if (hasValue(layer, cell)) {
-        if (isBitSet(layer.both, cell)) return MIXED;
+        if (isBitSet(layer.both, cell)) return BOTH_SIDES_COLOUR;
         return colourOf(layer, values[cell] * factor);
       }
       if (!isFilled(cell)) return null;
