@@ -9,9 +9,9 @@ const MARGINS = { left: 70, right: 14, top: 10, bottom: 130 };
 // the point that it computes.
 function createMap(host, data, panel) {
   const [xAxis, yAxis] = data.axes;
-  const extra = data.axes.slice(2);
+  const furtherAxes = data.axes.slice(2);
   const [nx, ny] = [xAxis.values.length, yAxis.values.length];
-  const cuts = extra.reduce((product, axis) => product * axis.values.length, 1);
+  const cutCount = furtherAxes.reduce((product, axis) => product * axis.values.length, 1);
   const { columns, codes, word, counts, wordsOf, isBitSet, isFilled, hasFailed, hasValue,
     hasMissingValues, placesOf, isSensitive, valuesOf, verdict } = createCells(data);
 
@@ -20,22 +20,22 @@ function createMap(host, data, panel) {
   const borders = [xAxis.borders.map(toCoordinateX), yAxis.borders.map(toCoordinateY)];
   const fullView = borders.map((list) => [list[0], list[list.length - 1]]);
   let view = fullView.map((range) => [...range]);
-  let rest = [...data.first.rest];
+  let otherPlaces = [...data.first.rest];
   const listeners = [];
   let hovered = null;
   let pinned = null;
   let cursor = [Math.floor(nx / 2), Math.floor(ny / 2)];
 
-  const centreOf = (place) => place.map((at, k) => 0.5 * (borders[k][at] + borders[k][at + 1]));
-  const currentCut = () => extra
-    .reduce((index, axis, k) => index * axis.values.length + rest[k], 0);
-  const pointAt = (i, j) => (i * ny + j) * cuts + currentCut();
+  const cellCentre = (place) => place.map((at, k) => 0.5 * (borders[k][at] + borders[k][at + 1]));
+  const currentCut = () => furtherAxes
+    .reduce((index, axis, k) => index * axis.values.length + otherPlaces[k], 0);
+  const pointAt = (i, j) => (i * ny + j) * cutCount + currentCut();
   const places = Array.from({ length: nx * ny }, (_, at) => [Math.floor(at / ny), at % ny]);
 
-  const find = appendTemplate(host, "map");
+  const findElement = appendTemplate(host, "map");
   const [controls, figure, tip, legend, readout, announcement, histories] = [".controls", "#map",
-    "#tip", "#legend", "#readout", "#said", "#histories"].map(find);
-  const quantity = find("#quantity");
+    "#tip", "#legend", "#readout", "#said", "#histories"].map(findElement);
+  const quantity = findElement("#quantity");
   quantity.addEventListener("change", () => changed());
   for (const { group, groupWords } of data.layers) {
     if (quantity.querySelector(`[data-group="${group}"]`)) continue;
@@ -45,13 +45,14 @@ function createMap(host, data, panel) {
   }
   quantity.append(element("option", { value: "status" }, "status"));
   quantity.value = data.first.column;
-  extra.forEach((axis, k) => {
+  furtherAxes.forEach((axis, k) => {
     const cut = element("select", { "data-axis": axis.name, onchange: () => {
-      rest[k] = Number(cut.value);
+      otherPlaces[k] = Number(cut.value);
       changed();
     } });
     cut.append(...axis.values.map((value, index) => element("option",
-      { value: index, selected: index === rest[k] }, `${formatSignificant(value)} ${axis.unit}`)));
+      { value: index, selected: index === otherPlaces[k] },
+      `${formatSignificant(value)} ${axis.unit}`)));
     controls.append(element("label", {}, axis.words, cut));
   });
 
@@ -89,16 +90,16 @@ function createMap(host, data, panel) {
     const { left, right, top, bottom } = MARGINS;
     return { left, top, width: figure.clientWidth - left - right, height: height() - top - bottom };
   }
-  const part = (value, k) => (value - view[k][0]) / (view[k][1] - view[k][0]);
-  const at = (share, k) => view[k][0] + share * (view[k][1] - view[k][0]);
-  const toPx = (box, x) => box.left + part(x, 0) * box.width;
-  const toPy = (box, y) => box.top + box.height * (1 - part(y, 1));
-  const fromPx = (box, px) => at((px - box.left) / box.width, 0);
-  const fromPy = (box, py) => at(1 - (py - box.top) / box.height, 1);
+  const viewFraction = (value, k) => (value - view[k][0]) / (view[k][1] - view[k][0]);
+  const fromFraction = (fraction, k) => view[k][0] + fraction * (view[k][1] - view[k][0]);
+  const toPx = (box, x) => box.left + viewFraction(x, 0) * box.width;
+  const toPy = (box, y) => box.top + box.height * (1 - viewFraction(y, 1));
+  const fromPx = (box, px) => fromFraction((px - box.left) / box.width, 0);
+  const fromPy = (box, py) => fromFraction(1 - (py - box.top) / box.height, 1);
 
   // Returns the filling of a cell: a colour, "failed", "undefined", or null if the file has no
   // point.
-  function filler(layer) {
+  function createFiller(layer) {
     if (!layer) {
       const { values, words } = codes.status;
       return (cell) => (values[cell] === SEVERAL_WORDS
@@ -124,8 +125,8 @@ function createMap(host, data, panel) {
   function paint(context) {
     const box = area();
     const layer = currentLayer();
-    const fill = filler(layer);
-    const special = {
+    const fill = createFiller(layer);
+    const fillStyles = {
       failed: createHatchPattern(context, data.palettes.failed),
       undefined: themeColour("paper"),
     };
@@ -143,7 +144,7 @@ function createMap(host, data, panel) {
         const start = j++;
         while (kind !== "undefined" && j < ny && fill(pointAt(i, j)) === kind) j++;
         if (kind === null) continue;
-        context.fillStyle = special[kind] ?? kind;
+        context.fillStyle = fillStyles[kind] ?? kind;
         context.fillRect(xs[i], ys[j], xs[i + 1] - xs[i], ys[start] - ys[j]);
         if (kind === "undefined") {
           const side = Math.min(4, 0.4 * (xs[i + 1] - xs[i]), 0.4 * (ys[start] - ys[j]));
@@ -159,13 +160,13 @@ function createMap(host, data, panel) {
         ...list.slice(1).map((at, k) => Math.abs(at - list[k])),
       );
       const side = Math.min(Math.max(Math.round((minDistance(xs) + minDistance(ys)) / 1.5), 3), 8);
-      const chaos = { lines: [[DARK, 2.4], [LIGHT, 1]], falling: true, side };
-      const marks = [[hasMissingValues, createHatchPattern(context, null, { side })],
-        [isSensitive, createHatchPattern(context, null, chaos)]];
-      for (const [marked, hatch] of marks) {
+      const chaosHatch = { lines: [[DARK, 2.4], [LIGHT, 1]], falling: true, side };
+      const hatches = [[hasMissingValues, createHatchPattern(context, null, { side })],
+        [isSensitive, createHatchPattern(context, null, chaosHatch)]];
+      for (const [isHatched, hatch] of hatches) {
         context.fillStyle = hatch;
         for (const [i, j] of places) {
-          if (!marked(layer, pointAt(i, j))) continue;
+          if (!isHatched(layer, pointAt(i, j))) continue;
           context.fillRect(xs[i], ys[j + 1], xs[i + 1] - xs[i], ys[j] - ys[j + 1]);
         }
       }
@@ -200,9 +201,9 @@ function createMap(host, data, panel) {
     context.rect(box.left, box.top, box.width, box.height);
     context.clip();
     // Rings mark the cells whose click shows time histories, unless all do.
-    if (data.traces && Object.keys(data.traces).length < nx * ny * cuts) {
+    if (data.traces && Object.keys(data.traces).length < nx * ny * cutCount) {
       for (const place of places.filter((at) => data.traces[pointAt(...at)])) {
-        const [x, y] = centreOf(place);
+        const [x, y] = cellCentre(place);
         context.beginPath();
         context.arc(toPx(box, x), toPy(box, y), 4, 0, 2 * Math.PI);
         strokeOutlined(context, [4, 1.5]);
@@ -221,9 +222,9 @@ function createMap(host, data, panel) {
   }
 
   function updateLegend(layer) {
-    const fine = layer && panel?.hasFine()
+    const fineEntries = layer && panel?.hasFine()
       ? [["border:1.5px dashed currentColor", "finer cells: preview, not checked"]] : [];
-    const entries = [...(layer?.legend ?? data.legend), ...fine];
+    const entries = [...(layer?.legend ?? data.legend), ...fineEntries];
     legend.replaceChildren(...entries.map(legendEntry));
   }
 
@@ -261,14 +262,14 @@ function createMap(host, data, panel) {
     for (const line of coordinates(place)) readout.append(element("p", {}, line));
     const largest = word("ratio_max_channel", point);
     const channelWords = largest ? ` (${wordsOf(largest)})` : "";
-    const where = isCellOfSeveral ? ` at point ${figure.dataset.point}` : "";
+    const pointText = isCellOfSeveral ? ` at point ${figure.dataset.point}` : "";
     readout.append(element("p", { class: "verdict" }, capitalise(verdict(point))),
       // The digits are those of the value if no step of the axis decides on them.
       ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${isCellOfSeveral
         ? `at ${counts.sensitive[point]} of ${counts.points[point]} points` : "here"}: `
         + "a slightly disturbed trajectory departs exponentially.")] : []),
       element("p", { id: "ratio" },
-        `Largest ratio ${shownValue("ratio_max", point)}${channelWords}${where}`));
+        `Largest ratio ${shownValue("ratio_max", point)}${channelWords}${pointText}`));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {
       const failedAt = shownValue("fail_time_s", point);
       const words = isCellOfSeveral ? "First failed" : "Failed";
@@ -287,8 +288,8 @@ function createMap(host, data, panel) {
       readout.append(element("p", { class: "help" }, data.traces[point]
         ? "Click or press Enter for its time histories." : "No time history kept for this point."));
     }
-    const value = layer ? [`${layer.label}: ${shownValue(layer.column, point)}`] : [];
-    const lines = [...coordinates(place), ...value, verdict(point)];
+    const layerTexts = layer ? [`${layer.label}: ${shownValue(layer.column, point)}`] : [];
+    const lines = [...coordinates(place), ...layerTexts, verdict(point)];
     announcement.textContent = lines.join("; ");
     tip.textContent = lines.join("\n");
     tip.hidden = !hovered;
@@ -320,7 +321,7 @@ function createMap(host, data, panel) {
   const valuesAt = (place) => valuesOf(pointAt(...place));
 
   function cutAt(k, index) {
-    rest[k] = index;
+    otherPlaces[k] = index;
     controls.querySelectorAll("select[data-axis]")[k].value = index;
   }
 
@@ -340,16 +341,18 @@ function createMap(host, data, panel) {
   }
 
   // The reactions to pointer and keys.
-  const pxOf = ({ clientX, clientY }) => {
+  const pointerPosition = ({ clientX, clientY }) => {
     const bounds = cellSurface.canvas.getBoundingClientRect();
     return [clientX - bounds.left, clientY - bounds.top];
   };
   const cellAt = (event) => {
-    const [box, [px, py]] = [area(), pxOf(event)];
-    const within = (value, from, size) => value >= from && value < from + size;
-    if (!within(px, box.left, box.width) || !within(py, box.top, box.height)) return null;
-    const find = (list, even) => Math.min(Math.max(lowerBound(list, even) - 1, 0), list.length - 2);
-    return [find(borders[0], fromPx(box, px)), find(borders[1], fromPy(box, py))];
+    const [box, [px, py]] = [area(), pointerPosition(event)];
+    const isWithin = (value, from, size) => value >= from && value < from + size;
+    if (!isWithin(px, box.left, box.width) || !isWithin(py, box.top, box.height)) return null;
+    const findCell = (list, even) => Math.min(
+      Math.max(lowerBound(list, even) - 1, 0), list.length - 2,
+    );
+    return [findCell(borders[0], fromPx(box, px)), findCell(borders[1], fromPy(box, py))];
   };
   const zoomButtons = interact(figure, {
     view: () => view,
@@ -364,9 +367,9 @@ function createMap(host, data, panel) {
     },
     zoom(factor, event) {
       const middle = view.map(([low, high]) => 0.5 * (low + high));
-      let centre = hovered ? centreOf(hovered) : middle;
+      let centre = hovered ? cellCentre(hovered) : middle;
       if (event) {
-        const [box, px] = [area(), pxOf(event)];
+        const [box, px] = [area(), pointerPosition(event)];
         centre = [fromPx(box, px[0]), fromPy(box, px[1])];
       }
       setView(view.map((range, k) => zoomView(range, factor, centre[k], fullView[k])));
@@ -382,8 +385,8 @@ function createMap(host, data, panel) {
       if (step) {
         const stride = event.shiftKey ? 5 : 1;
         const next = cursor.map((at, k) => at + stride * step[k]);
-        const within = (at, k) => Math.min(Math.max(at, 0), [nx, ny][k] - 1);
-        hover(hovered ? next.map(within) : [...cursor]);
+        const clampPlace = (at, k) => Math.min(Math.max(at, 0), [nx, ny][k] - 1);
+        hover(hovered ? next.map(clampPlace) : [...cursor]);
       } else if (event.key === "Enter" || event.key === " ") pin([...cursor]);
       else if (event.key === "Escape") pin(null);
       else return false;
@@ -402,9 +405,9 @@ function createMap(host, data, panel) {
     // The range about a point that is so many cells wide, or the view if it is zoomed.
     region: (at, cellsWide) => view.map(([low, high], k) => {
       if (isZoomed()) return [low, high];
-      const half = (0.5 * cellsWide * (high - low)) / (k === 0 ? nx : ny);
+      const halfWidth = (0.5 * cellsWide * (high - low)) / (k === 0 ? nx : ny);
       const middle = toCoordinates[k](at[k]);
-      return [Math.max(middle - half, low), Math.min(middle + half, high)];
+      return [Math.max(middle - halfWidth, low), Math.min(middle + halfWidth, high)];
     }),
     mark: overlaySurface.request,
     request: () => {
@@ -423,11 +426,11 @@ function createMap(host, data, panel) {
     chosen: () => pinned ?? hovered,
     index: pointAt,
     // The state that a link holds, and its restoration.
-    state: () => ({ show: quantity.value, rest, view: view.flat(), pinned }),
+    state: () => ({ show: quantity.value, rest: otherPlaces, view: view.flat(), pinned }),
     restore(state) {
-      const offers = (select, value) => [...select.options].some((one) => one.value === value);
-      if (offers(quantity, state.show)) quantity.value = state.show;
-      extra.forEach((axis, k) => {
+      const hasOption = (select, value) => [...select.options].some((one) => one.value === value);
+      if (hasOption(quantity, state.show)) quantity.value = state.show;
+      furtherAxes.forEach((axis, k) => {
         if (state.rest?.[k] >= 0 && state.rest[k] < axis.values.length) cutAt(k, state.rest[k]);
       });
       const [x0, x1, y0, y1] = state.view ?? [];
