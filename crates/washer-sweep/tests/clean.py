@@ -6,11 +6,11 @@ import pathlib
 
 import washer_sweep
 
-from conftest_grid import SHORT
+from conftest_grid import SHORT_GRID
 
 assert importlib.util.find_spec("numpy") is None, "the environment is not clean"
 assert (pathlib.Path(washer_sweep.__file__).parent / "py.typed").exists()
-result = washer_sweep.Plan(SHORT).evaluate(
+result = washer_sweep.Plan(SHORT_GRID).evaluate(
     {"unbalance_mass_kg": [0.1, 0.5], "damping_n_s_per_m": [60, 100.0]}
 )
 assert len(result) == 2

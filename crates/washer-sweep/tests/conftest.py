@@ -7,7 +7,7 @@ import signal
 
 import pyarrow as pa
 import pytest
-from conftest_grid import SHORT
+from conftest_grid import SHORT_GRID
 
 import washer_sweep
 
@@ -24,22 +24,22 @@ def rows(result):
     have all words that may occur.
     """
     table = pa.table(result)
-    words = [field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field
+    string_fields = [field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field
              for field in table.schema]
-    return table.cast(pa.schema(words)).combine_chunks()
+    return table.cast(pa.schema(string_fields)).combine_chunks()
 
 
 @pytest.fixture
-def short():
+def short_plan():
     """Returns a plan of 20 points."""
-    return washer_sweep.Plan(SHORT)
+    return washer_sweep.Plan(SHORT_GRID)
 
 
 @pytest.fixture
-def long():
+def long_plan():
     """Returns a plan whose run takes minutes."""
     time = {"end_s": 200.0, "window_s": [0.5, 200.0]}
-    return washer_sweep.Plan({**SHORT, "name": "long", "time": time,
+    return washer_sweep.Plan({**SHORT_GRID, "name": "long", "time": time,
                               "integrator": {"method": "rk4", "step_s": 1e-4}})
 
 

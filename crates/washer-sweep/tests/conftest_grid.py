@@ -1,7 +1,7 @@
 """The grid that most tests use."""
 
 # A grid with a short run-up of two seconds, which takes a hundredth of the time of Fig. 12.
-SHORT = {
+SHORT_GRID = {
     "name": "short",
     "spin": {"profile": "ramp", "peak_rpm": 300, "ramp_s": 1.5},
     "time": {"end_s": 2.0, "window_s": [0.5, 2.0]},

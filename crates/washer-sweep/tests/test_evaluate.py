@@ -10,7 +10,7 @@ import polars as pl
 import pyarrow as pa
 import pytest
 from conftest import ROOT, rows
-from conftest_grid import SHORT
+from conftest_grid import SHORT_GRID
 
 import washer_sweep
 from washer_sweep import Plan, PlanError
@@ -18,7 +18,7 @@ from washer_sweep import Plan, PlanError
 AXES = ["unbalance_mass_kg", "damping_n_s_per_m"]
 
 
-def columns(plan):
+def grid_columns(plan):
     """Returns the plan's grid as columns."""
     points = itertools.product(np.linspace(0.1, 0.9, 5), np.linspace(60.0, 300.0, 4))
     return dict(zip(AXES, map(np.array, zip(*points)), strict=True))
@@ -38,30 +38,31 @@ def test_fig12_has_the_bits_of_the_commands_rows(sweep, tmp_path):
     for order_part in (order[:37], order):
         points = pa.concat_tables([table.select(AXES).take(part)
                                    for part in np.array_split(order_part, 3)])
-        evaluated = rows(plan.evaluate(points)).drop_columns("point")
-        assert evaluated == table.take(order_part).drop_columns("point").combine_chunks()
+        result_rows = rows(plan.evaluate(points)).drop_columns("point")
+        assert result_rows == table.take(order_part).drop_columns("point").combine_chunks()
 
 
-def test_numbers_of_every_format_are_read_and_other_values_are_rejected(short):
-    table = columns(short)
-    expected = rows(short.evaluate(table))
+def test_numbers_of_every_format_are_read_and_other_values_are_rejected(short_plan):
+    table = grid_columns(short_plan)
+    expected = rows(short_plan.evaluate(table))
     for dtype in (">f8", "<f8", ">f4", "O", "longdouble"):
         typed_table = {name: values.astype(dtype) for name, values in table.items()}
         if dtype == ">f4":
             table = {name: values.astype("f4").astype("f8") for name, values in table.items()}
-        assert rows(short.evaluate(typed_table)) == rows(short.evaluate(table)), dtype
-        table = columns(short)
+        assert rows(short_plan.evaluate(typed_table)) == rows(short_plan.evaluate(table)), dtype
+        table = grid_columns(short_plan)
     counts = {name: np.round(values + 0.5).astype(">i4") for name, values in table.items()}
     counts["unbalance_mass_kg"] = table["unbalance_mass_kg"]
-    assert rows(short.evaluate(counts))["damping_n_s_per_m"].to_pylist() == list(
+    assert rows(short_plan.evaluate(counts))["damping_n_s_per_m"].to_pylist() == list(
         np.round(table["damping_n_s_per_m"] + 0.5))
-    assert expected == rows(short.evaluate({name: list(values) for name, values in table.items()}))
+    lists = {name: list(values) for name, values in table.items()}
+    assert expected == rows(short_plan.evaluate(lists))
     mass = table["unbalance_mass_kg"]
     for invalid_values in (np.ma.masked_less(mass, 0.3), mass + 0j, mass.astype("c8"), mass > 0.5,
                            list(mass > 0.5), [True] * len(mass), mass.astype("M8[s]"),
                            mass.astype("U")):
         with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
-            short.evaluate({**table, "unbalance_mass_kg": invalid_values})
+            short_plan.evaluate({**table, "unbalance_mass_kg": invalid_values})
     for invalid_values in (np.ma.masked_less(np.arange(60.0, 63.0), 61), np.arange(60, 62) + 0j,
                            [True]):
         with pytest.raises(TypeError, match="expected"):
@@ -70,10 +71,10 @@ def test_numbers_of_every_format_are_read_and_other_values_are_rejected(short):
         washer_sweep.modes(speeds_rpm=[60, 70]))
 
 
-def test_every_kind_of_table_gives_the_same_rows(short):
-    table = columns(short)
-    expected = pa.table(short.evaluate(table))
-    assert expected == pa.table(short.run(progress=False))
+def test_every_kind_of_table_gives_the_same_rows(short_plan):
+    table = grid_columns(short_plan)
+    expected = pa.table(short_plan.evaluate(table))
+    assert expected == pa.table(short_plan.run(progress=False))
     relation = pd.DataFrame(table)
     for source in (
         pa.table(table),
@@ -91,22 +92,23 @@ def test_every_kind_of_table_gives_the_same_rows(short):
         {name: pl.Series(values) for name, values in table.items()},
         pa.table(expected.select(AXES)),
     ):
-        assert pa.table(short.evaluate(source)) == expected, type(source)
-    whole = {"unbalance_mass_kg": np.array([1]), "damping_n_s_per_m": np.array([60, 300])[:1]}
-    plan = Plan({**SHORT, "axis": [{"parameter": AXES[0], "values": [1, 0.1]},
-                                   {"parameter": AXES[1], "values": [60, 300]}]})
-    assert plan.evaluate(whole)["unbalance_mass_kg"].tolist() == [1.0]
+        assert pa.table(short_plan.evaluate(source)) == expected, type(source)
+    integer_table = {"unbalance_mass_kg": np.array([1]),
+                     "damping_n_s_per_m": np.array([60, 300])[:1]}
+    plan = Plan({**SHORT_GRID, "axis": [{"parameter": AXES[0], "values": [1, 0.1]},
+                                        {"parameter": AXES[1], "values": [60, 300]}]})
+    assert plan.evaluate(integer_table)["unbalance_mass_kg"].tolist() == [1.0]
 
 
-def test_no_row_depends_on_the_others_or_on_threads(short):
-    table = columns(short)
-    expected = pa.table(short.evaluate(table))
+def test_no_row_depends_on_the_others_or_on_threads(short_plan):
+    table = grid_columns(short_plan)
+    expected = pa.table(short_plan.evaluate(table))
     for row in (0, 7, 19):
-        alone = {name: values[row : row + 1] for name, values in table.items()}
-        evaluated = pa.table(short.evaluate(alone, threads=1)).drop_columns("point")
-        assert evaluated == expected.slice(row, 1).drop_columns("point")
-    assert pa.table(short.evaluate(table, threads=1)) == expected
-    assert pa.table(short.evaluate(table, threads=3)) == expected
+        one_row_table = {name: values[row : row + 1] for name, values in table.items()}
+        result_rows = pa.table(short_plan.evaluate(one_row_table, threads=1)).drop_columns("point")
+        assert result_rows == expected.slice(row, 1).drop_columns("point")
+    assert pa.table(short_plan.evaluate(table, threads=1)) == expected
+    assert pa.table(short_plan.evaluate(table, threads=3)) == expected
 
 
 @pytest.mark.parametrize(("table", "expected_text"), [
@@ -125,40 +127,41 @@ def test_no_row_depends_on_the_others_or_on_threads(short):
     (pa.table([[0.1], [0.1], [60.0]], names=[*AXES[:1], *AXES[:1], AXES[1]]), "is given twice"),
     ({}, "has no column `unbalance_mass_kg`"),
 ])
-def test_an_invalid_table_is_rejected_with_the_location(short, table, expected_text):
+def test_an_invalid_table_is_rejected_with_the_location(short_plan, table, expected_text):
     with pytest.raises(PlanError) as caught:
-        short.evaluate(table)
+        short_plan.evaluate(table)
     assert expected_text in str(caught.value)
     assert caught.value.diagnostics[0]["file"] == "table"
 
 
-def test_other_objects_than_tables_are_rejected(short):
+def test_other_objects_than_tables_are_rejected(short_plan):
     for table in ([1, 2], None, "x", 3.0):
         with pytest.raises(TypeError, match="__arrow_c_stream__"):
-            short.evaluate(table)
+            short_plan.evaluate(table)
     with pytest.raises(TypeError, match="column `unbalance_mass_kg`: expected numbers"):
-        short.evaluate({"unbalance_mass_kg": ["a"], "damping_n_s_per_m": [60]})
+        short_plan.evaluate({"unbalance_mass_kg": ["a"], "damping_n_s_per_m": [60]})
     for square in (np.ones((2, 2)), np.ones((2, 2), int), np.ones((2, 1)), np.ones((2, 1), int)):
         with pytest.raises(TypeError, match="expected numbers"):
-            short.evaluate({"unbalance_mass_kg": square, "damping_n_s_per_m": [60, 60]})
+            short_plan.evaluate({"unbalance_mass_kg": square, "damping_n_s_per_m": [60, 60]})
     for threads in (0, 5000):
         with pytest.raises(PlanError, match="expected a number from 1 to 4096"):
-            short.evaluate(columns(short), threads=threads)
+            short_plan.evaluate(grid_columns(short_plan), threads=threads)
 
 
-def test_a_table_without_rows_gives_a_result_without_rows(short):
-    evaluated = short.evaluate({"unbalance_mass_kg": [], "damping_n_s_per_m": []})
-    assert len(evaluated) == 0
-    assert pa.table(evaluated).schema == pa.table(short.run(progress=False)).schema
+def test_a_table_without_rows_gives_a_result_without_rows(short_plan):
+    result_rows = short_plan.evaluate({"unbalance_mass_kg": [], "damping_n_s_per_m": []})
+    assert len(result_rows) == 0
+    assert pa.table(result_rows).schema == pa.table(short_plan.run(progress=False)).schema
 
 
 def test_an_axis_of_one_value_may_be_left_out():
-    plan = Plan({**SHORT, "axis": [*SHORT["axis"], {"parameter": "tub_mass_kg", "values": [20]}]})
-    evaluated = plan.evaluate({"unbalance_mass_kg": [0.4], "damping_n_s_per_m": [100]})
-    assert evaluated["tub_mass_kg"].tolist() == [20.0]
+    axes = [*SHORT_GRID["axis"], {"parameter": "tub_mass_kg", "values": [20]}]
+    plan = Plan({**SHORT_GRID, "axis": axes})
+    result_rows = plan.evaluate({"unbalance_mass_kg": [0.4], "damping_n_s_per_m": [100]})
+    assert result_rows["tub_mass_kg"].tolist() == [20.0]
 
 
-def test_a_million_invalid_rows_are_reported_quickly(short):
+def test_a_million_invalid_rows_are_reported_quickly(short_plan):
     with pytest.raises(PlanError, match=r"1000000 mistakes \(100 shown\)"):
-        short.evaluate({"unbalance_mass_kg": np.full(1_000_000, 2.0),
-                        "damping_n_s_per_m": np.full(1_000_000, 60.0)})
+        short_plan.evaluate({"unbalance_mass_kg": np.full(1_000_000, 2.0),
+                             "damping_n_s_per_m": np.full(1_000_000, 60.0)})

@@ -10,12 +10,12 @@ import pyarrow as pa
 import pyarrow.csv
 import pytest
 from conftest import ROOT, rows
-from conftest_grid import SHORT
+from conftest_grid import SHORT_GRID
 
 import washer_sweep
 from washer_sweep import Plan, PlanError
 
-QUICK = ROOT / "sweeps/quick.toml"
+QUICK_GRID = ROOT / "sweeps/quick.toml"
 POINT = {"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 100.0}
 
 
@@ -26,9 +26,9 @@ def standard_output(*command):
 
 def test_stability_has_the_bytes_of_the_command(sweep, tmp_path):
     by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
-    standard_output(sweep, "stability", QUICK, "--speed", "240:320:20", "--out", by_command,
+    standard_output(sweep, "stability", QUICK_GRID, "--speed", "240:320:20", "--out", by_command,
                     "--progress", "none")
-    plan = Plan.from_toml(QUICK)
+    plan = Plan.from_toml(QUICK_GRID)
     result = washer_sweep.stability(plan, range(240, 321, 20), by_call, progress=False)
     assert by_call.read_bytes() == by_command.read_bytes()
     in_memory = washer_sweep.stability(plan, np.arange(240.0, 321.0, 20.0), progress=False)
@@ -45,9 +45,9 @@ def test_stability_has_the_bytes_of_the_command(sweep, tmp_path):
 
 def test_attractors_have_the_bytes_of_the_command(sweep, tmp_path):
     by_command, by_call, saved = (tmp_path / f"{name}.parquet" for name in "abc")
-    standard_output(sweep, "dwell", QUICK, "--speed", "250,297.5", "--starts", "2", "--out",
+    standard_output(sweep, "dwell", QUICK_GRID, "--speed", "250,297.5", "--starts", "2", "--out",
                     by_command, "--progress", "none")
-    plan = Plan.from_toml(QUICK)
+    plan = Plan.from_toml(QUICK_GRID)
     result = washer_sweep.dwell(plan, [250, 297.5], by_call, starts=2, progress=False)
     assert by_call.read_bytes() == by_command.read_bytes()
     washer_sweep.dwell(plan, [250, 297.5], starts=2, progress=False).save(saved)
@@ -61,26 +61,28 @@ def test_attractors_have_the_bytes_of_the_command(sweep, tmp_path):
 
 
 def test_an_explanation_is_that_of_the_command(sweep):
-    command = [sweep, "explain", QUICK, "--speed", "240:320:4"]
+    command = [sweep, "explain", QUICK_GRID, "--speed", "240:320:4"]
     for name, value in POINT.items():
         command += ["--at", f"{name}={value}"]
-    computed = washer_sweep.explain(Plan.from_toml(QUICK), POINT, speeds_rpm=range(240, 321, 4))
+    plan = Plan.from_toml(QUICK_GRID)
+    computed = washer_sweep.explain(plan, POINT, speeds_rpm=range(240, 321, 4))
     assert computed == json.loads(standard_output(*command, "--json"))
     assert str(computed) == computed.text == standard_output(*command)
-    again = pickle.loads(pickle.dumps(computed))
-    assert (again, again.text) == (computed, computed.text)
+    restored = pickle.loads(pickle.dumps(computed))
+    assert (restored, restored.text) == (computed, computed.text)
 
 
 def test_a_fit_is_that_of_the_command(sweep, tmp_path):
-    bench = ROOT / "sweeps/bench.toml"
+    bench_grid = ROOT / "sweeps/bench.toml"
     table = pyarrow.csv.read_csv(ROOT / "crates/sweep/testdata/fit/viscous.csv").slice(0, 250)
-    measured = tmp_path / "table"
-    pyarrow.csv.write_csv(table, measured)
+    measurement_file = tmp_path / "table"
+    pyarrow.csv.write_csv(table, measurement_file)
     free, own = ["damping_n_s_per_m=50:500"], ["unbalance_mass_kg"]
-    command = [sweep, "fit", bench, measured, f"{measured}@spring_stiffness_n_per_m=8350",
-             "--free", free[0], "--own", own[0], "--draws", "4", "--progress", "none"]
+    command = [sweep, "fit", bench_grid, measurement_file,
+               f"{measurement_file}@spring_stiffness_n_per_m=8350", "--free", free[0],
+               "--own", own[0], "--draws", "4", "--progress", "none"]
     at = [{}, {"spring_stiffness_n_per_m": 8350}]
-    computed = washer_sweep.fit(Plan.from_toml(bench), [table, table], free, own=own, at=at,
+    computed = washer_sweep.fit(Plan.from_toml(bench_grid), [table, table], free, own=own, at=at,
                                 draws=4)
     by_command = json.loads(standard_output(*command, "--json"))
     # The second table has no name of its own.
@@ -94,11 +96,11 @@ def test_a_fit_is_that_of_the_command(sweep, tmp_path):
     assert [fit["name"] for fit in computed["parameters"]] == [*free[0].split("=")[:1], *own, *own]
     assert computed["verdict"]["draws"] == 4
     with pytest.raises(PlanError, match="did you mean `damping_n_s_per_m`"):
-        washer_sweep.fit(Plan.from_toml(bench), table, ["dampin_n_s_per_m"])
+        washer_sweep.fit(Plan.from_toml(bench_grid), table, ["dampin_n_s_per_m"])
 
 
 def test_growth_is_a_metric_of_a_table_too(tmp_path):
-    grid = {**SHORT, "metrics": ["growth"], "stability": {"speed_rpm": "240:260:10"}}
+    grid = {**SHORT_GRID, "metrics": ["growth"], "stability": {"speed_rpm": "240:260:10"}}
     plan = Plan(grid)
     by_run = rows(plan.run(tmp_path / "x.parquet", progress=False))
     by_table = plan.evaluate(by_run.select(list(POINT)))
@@ -108,8 +110,8 @@ def test_growth_is_a_metric_of_a_table_too(tmp_path):
 
 def test_a_file_of_differences_is_read(sweep, tmp_path):
     old, new, out = (tmp_path / f"{name}.parquet" for name in ("old", "new", "out"))
-    Plan(SHORT).run(old, progress=False)
-    Plan(SHORT, set={"tub_mass_kg": 20}).run(new, progress=False)
+    Plan(SHORT_GRID).run(old, progress=False)
+    Plan(SHORT_GRID, set={"tub_mass_kg": 20}).run(new, progress=False)
     standard_output(sweep, "compare", old, new, "--out", out)
     computed = washer_sweep.read(out)
     assert computed.kind == "differences"
@@ -127,13 +129,13 @@ def test_a_file_of_differences_is_read(sweep, tmp_path):
     (lambda plan: washer_sweep.explain(plan, POINT, threads=0), "expected a number from 1"),
     (lambda plan: washer_sweep.fit(plan, [], ["tub_mass_kg"]), "a table or more"),
 ])
-def test_invalid_arguments_are_rejected(short, invalid_call, expected_text):
+def test_invalid_arguments_are_rejected(short_plan, invalid_call, expected_text):
     with pytest.raises(PlanError, match=expected_text):
-        invalid_call(short)
+        invalid_call(short_plan)
 
 
 def test_held_speeds_conflict_with_an_axis_of_the_speed():
     axis = {"parameter": "spin_peak_rpm", "range": {"from": 200, "to": 300, "count": 3}}
-    plan = Plan({**SHORT, "axis": [axis]})
+    plan = Plan({**SHORT_GRID, "axis": [axis]})
     with pytest.raises(PlanError, match="give its range as speeds"):
         washer_sweep.stability(plan, [240.0], progress=False)

@@ -10,19 +10,20 @@ from conftest import rows
 import washer_sweep
 
 
-def evaluated(plan, masses):
+def evaluate_masses(plan, masses):
     """Returns the rows of a plan. In a worker process the plan is received, and the rows are
     returned, by pickle."""
     return plan.evaluate({"unbalance_mass_kg": masses, "damping_n_s_per_m": [100.0] * len(masses)})
 
 
-def test_a_plan_and_its_rows_go_through_a_pool_of_processes(short):
-    here = evaluated(short, [0.2, 0.4])
+def test_a_plan_and_its_rows_go_through_a_pool_of_processes(short_plan):
+    own_rows = evaluate_masses(short_plan, [0.2, 0.4])
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
-        there = pool.submit(evaluated, short, [0.2, 0.4]).result()
-    assert rows(there) == rows(here)
-    assert (there.kind, there.plan, there.units) == (here.kind, here.plan, here.units)
+        pool_rows = pool.submit(evaluate_masses, short_plan, [0.2, 0.4]).result()
+    assert rows(pool_rows) == rows(own_rows)
+    assert (pool_rows.kind, pool_rows.plan) == (own_rows.kind, own_rows.plan)
+    assert pool_rows.units == own_rows.units
 
 
 def test_a_plan_is_the_same_from_a_file_a_text_and_a_table(tmp_path, monkeypatch):
@@ -44,17 +45,17 @@ values = [0.1, 0.2]
     for plan in plans:
         pickled = pickle.dumps(plan)
         monkeypatch.chdir(tmp_path / "elsewhere")
-        again = pickle.loads(pickled)
+        restored_plan = pickle.loads(pickled)
         monkeypatch.chdir(tmp_path)
-        assert again.to_dict() == plan.to_dict()
+        assert restored_plan.to_dict() == plan.to_dict()
     keys = {"name": "pickled", "time": {"end_s": 0.1}, "integrator": {"method": "rk4"},
             "spin": {"profile": "triangular", "peak_rpm": 350, "ramp_s": 50}}
     plan = washer_sweep.Plan(keys, set=sets)
     assert pickle.loads(pickle.dumps(plan)).to_dict() == plan.to_dict()
 
 
-def test_a_result_that_was_saved_has_the_same_bytes_after_pickling(short, tmp_path):
-    result = evaluated(short, [0.3])
+def test_a_result_that_was_saved_has_the_same_bytes_after_pickling(short_plan, tmp_path):
+    result = evaluate_masses(short_plan, [0.3])
     pickle.loads(pickle.dumps(result)).save(tmp_path / "again.parquet")
     result.save(tmp_path / "first.parquet")
     assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / "first.parquet").read_bytes()

@@ -14,8 +14,8 @@ class Explanation(dict[str, Any]):
 
     text: str
 
-    def __init__(self, found: Mapping[str, Any], text: str) -> None:
-        super().__init__(found)
+    def __init__(self, data: Mapping[str, Any], text: str) -> None:
+        super().__init__(data)
         self.text = text
 
     def __reduce__(self) -> tuple[type[Explanation], tuple[dict[str, Any], str]]:
