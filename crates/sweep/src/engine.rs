@@ -217,8 +217,8 @@ impl<'a> ModelEngine<'a> {
         let threads = if is_in_pool { rayon::current_num_threads() } else { 1 };
         let pool = Pool { engine: self, source, sink, context, threads, state, changed };
         match is_in_pool {
-            true => drop(rayon::broadcast(|_| pool.work())),
-            false => pool.work(),
+            true => drop(rayon::broadcast(|_| pool.run_worker())),
+            false => pool.run_worker(),
         }
     }
 

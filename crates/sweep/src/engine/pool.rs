@@ -41,8 +41,8 @@ impl ModelEngine<'_> {
     /// Returns the maximum number of rows that so many threads have under refinement at once. For
     /// each level of both models less than a batch waits, and each thread has one batch.
     pub(crate) fn max_rows_in_flight(&self, threads: usize) -> usize {
-        let levels: usize = self.levels().iter().map(|levels| 2 * levels.levels.len()).sum();
-        (levels + threads) * batch_size(&self.levels()[0].levels[0])
+        let level_count: usize = self.levels().iter().map(|levels| 2 * levels.levels.len()).sum();
+        (level_count + threads) * batch_size(&self.levels()[0].levels[0])
     }
 }
 
@@ -69,18 +69,20 @@ struct RowTask {
     point: Result<Arc<Point>, Status>,
     refinement: RowRefinement,
     /// The runs that have returned since the last step, each with its model and its level.
-    runs: Vec<((usize, usize), LevelRun)>,
+    returned_runs: Vec<((usize, usize), LevelRun)>,
     /// The number of runs that were requested and have not returned.
-    pending: usize,
-    /// The number of rows queued before it.
-    sequence: u64,
+    pending_runs: usize,
+    /// The number of rows that were queued before this one.
+    queue_sequence: u64,
 }
 
 impl RowTask {
     /// Returns the runs that the row needs next, or its outcome. No run may be pending.
-    fn next(&mut self, rule: RefinementRule<'_>) -> NextStep {
+    fn next_step(&mut self, rule: RefinementRule<'_>) -> NextStep {
         match &self.point {
-            Ok(point) => self.refinement.advance(take(&mut self.runs), self.id, point, rule),
+            Ok(point) => {
+                self.refinement.advance(take(&mut self.returned_runs), self.id, point, rule)
+            }
             Err(status) => {
                 let method = rule.levels[0].levels[0].kind;
                 NextStep::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
@@ -93,32 +95,32 @@ impl RowTask {
 #[derive(Default)]
 pub(super) struct PoolState {
     /// Rows under refinement, by the caller's identifier.
-    rows: BTreeMap<u64, RowTask>,
-    /// The number of points taken from the source.
-    queued: u64,
-    /// Rows that wait for a run, by its kind.
-    waiting: BTreeMap<RunKind, Vec<u64>>,
+    tasks: BTreeMap<u64, RowTask>,
+    /// The number of rows that were queued so far: the points taken from the source.
+    queued_rows: u64,
+    /// The identifiers of the rows that wait for a run, by the kind of the run, oldest first.
+    waiting_rows: BTreeMap<RunKind, Vec<u64>>,
     /// The number of threads at work on runs or points.
     busy_threads: usize,
     /// Whether the source is empty.
     is_source_empty: bool,
 }
 
-/// The next work of a thread.
-enum Work {
+/// The next action of a thread.
+enum ThreadAction {
     Prepare,
     Runs(RunKind, Vec<(u64, Arc<Point>)>),
     Wait,
     End,
 }
 
-/// The threads' shared work.
+/// The queue of rows that the threads share, with its source and sink.
 pub(super) struct Pool<'a> {
     pub(super) engine: &'a ModelEngine<'a>,
     pub(super) source: &'a RowSource<'a>,
     pub(super) sink: &'a OutcomeSink<'a>,
     pub(super) context: &'a RunContext<'a>,
-    /// The number of threads that call [`Self::work`].
+    /// The number of threads that call [`Self::run_worker`].
     pub(super) threads: usize,
     pub(super) state: Mutex<PoolState>,
     pub(super) changed: Condvar,
@@ -126,41 +128,42 @@ pub(super) struct Pool<'a> {
 
 impl Pool<'_> {
     /// Works on one thread until nothing is left or the context is stopped.
-    pub(super) fn work(&self) {
+    pub(super) fn run_worker(&self) {
         while !self.context.must_stop() {
-            let mut state = self.lock();
-            let size_of_kind = |(level, model): RunKind| {
-                let size = |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
-                self.rule().map_or(MAX_LANES, size)
+            let mut state = self.lock_state();
+            let full_batch_size = |(level, model): RunKind| {
+                let batch_size_by_rule =
+                    |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
+                self.rule().map_or(MAX_LANES, batch_size_by_rule)
             };
-            match state.choose(&size_of_kind, self.threads) {
-                Work::End => break,
-                Work::Wait => drop(self.changed.wait_timeout(state, STOP_POLL_INTERVAL)),
-                Work::Prepare => {
+            match state.choose_action(&full_batch_size, self.threads) {
+                ThreadAction::End => break,
+                ThreadAction::Wait => drop(self.changed.wait_timeout(state, STOP_POLL_INTERVAL)),
+                ThreadAction::Prepare => {
                     state.busy_threads += 1;
                     drop(state);
                     let mut rows = self.prepare_rows();
-                    let mut state = self.lock();
+                    let mut state = self.lock_state();
                     state.is_source_empty |= rows.is_empty();
                     for row in &mut rows {
-                        row.sequence = state.queued;
-                        state.queued += 1;
+                        row.queue_sequence = state.queued_rows;
+                        state.queued_rows += 1;
                     }
-                    self.advance(state, rows);
+                    self.advance_rows(state, rows);
                 }
-                Work::Runs((level, model), taken) => {
+                ThreadAction::Runs((level, model), run_batch) => {
                     state.busy_threads += 1;
                     drop(state);
                     let Some(rule) = self.rule() else { break };
                     let levels = &rule.levels[model];
-                    let originals = || taken.iter().map(|(_, point)| point.as_ref());
-                    let perturbed: Vec<Point> = match levels.is_perturbed(level) {
-                        true => originals().map(Point::perturbed).collect(),
+                    let original_points = || run_batch.iter().map(|(_, point)| point.as_ref());
+                    let perturbed_points: Vec<Point> = match levels.is_perturbed(level) {
+                        true => original_points().map(Point::perturbed).collect(),
                         false => Vec::new(),
                     };
-                    let points: Vec<&Point> = match perturbed.is_empty() {
-                        true => originals().collect(),
-                        false => perturbed.iter().collect(),
+                    let points: Vec<&Point> = match perturbed_points.is_empty() {
+                        true => original_points().collect(),
+                        false => perturbed_points.iter().collect(),
                     };
                     let runs = self.engine.integrate_runs(
                         model,
@@ -172,15 +175,15 @@ impl Pool<'_> {
                     if self.context.must_stop() {
                         break;
                     }
-                    let mut state = self.lock();
-                    let mut rows = Vec::with_capacity(taken.len());
-                    for ((position, _), run) in taken.iter().zip(runs) {
-                        let Some(mut row) = state.rows.remove(position) else { continue };
-                        row.pending -= 1;
-                        row.runs.push(((model, level), run));
+                    let mut state = self.lock_state();
+                    let mut rows = Vec::with_capacity(run_batch.len());
+                    for ((row_id, _), run) in run_batch.iter().zip(runs) {
+                        let Some(mut row) = state.tasks.remove(row_id) else { continue };
+                        row.pending_runs -= 1;
+                        row.returned_runs.push(((model, level), run));
                         rows.push(row);
                     }
-                    self.advance(state, rows);
+                    self.advance_rows(state, rows);
                 }
             }
         }
@@ -195,51 +198,52 @@ impl Pool<'_> {
         Some(RefinementRule { levels, purpose: *demand, row_rule: rule })
     }
 
-    fn lock(&self) -> MutexGuard<'_, PoolState> {
+    fn lock_state(&self) -> MutexGuard<'_, PoolState> {
         lock(&self.state)
     }
 
     /// Prepares the next points of the source; none at its end.
     fn prepare_rows(&self) -> Vec<RowTask> {
         let rows = std::iter::from_fn(self.source).take(PREPARE_BATCH);
-        let input = |(id, values): (u64, Vec<f64>)| (id, point_input(self.engine.plan, &values));
-        let (ids, inputs): (Vec<u64>, Vec<PointInput>) = rows.map(input).unzip();
+        let id_and_input =
+            |(id, values): (u64, Vec<f64>)| (id, point_input(self.engine.plan, &values));
+        let (ids, inputs): (Vec<u64>, Vec<PointInput>) = rows.map(id_and_input).unzip();
         let points = self.engine.prepare(&inputs);
-        let row = |(id, point): (u64, Result<Point, Status>)| {
+        let new_task = |(id, point): (u64, Result<Point, Status>)| {
             let point = point.map(Arc::new);
             RowTask {
                 id,
                 point,
                 refinement: RowRefinement::default(),
-                runs: Vec::new(),
-                pending: 0,
-                sequence: 0,
+                returned_runs: Vec::new(),
+                pending_runs: 0,
+                queue_sequence: 0,
             }
         };
-        ids.into_iter().zip(points).map(row).collect()
+        ids.into_iter().zip(points).map(new_task).collect()
     }
 
     /// Queues the next runs of rows, and gives the sink those that are done.
-    fn advance(&self, mut state: MutexGuard<'_, PoolState>, rows: Vec<RowTask>) {
-        let mut done = Vec::new();
+    fn advance_rows(&self, mut state: MutexGuard<'_, PoolState>, rows: Vec<RowTask>) {
+        let mut finished_rows = Vec::new();
         for mut row in rows {
-            let next = if row.pending > 0 {
+            let next_step = if row.pending_runs > 0 {
                 NextStep::Runs(Vec::new())
             } else {
                 // Rows of a stopped run are dropped.
                 let Some(rule) = self.rule() else { break };
-                row.next(rule)
+                row.next_step(rule)
             };
-            match next {
-                NextStep::Runs(kinds) => {
-                    let position = row.id;
-                    row.pending += kinds.len();
-                    for (model, level) in kinds {
-                        state.waiting.entry((level, model)).or_default().push(position);
+            match next_step {
+                NextStep::Runs(run_kinds) => {
+                    let row_id = row.id;
+                    row.pending_runs += run_kinds.len();
+                    for (model, level) in run_kinds {
+                        state.waiting_rows.entry((level, model)).or_default().push(row_id);
                     }
-                    state.rows.insert(position, row);
+                    state.tasks.insert(row_id, row);
                 }
-                NextStep::Done(outcome) => done.push((*outcome, row.point)),
+                NextStep::Done(outcome) => finished_rows.push((*outcome, row.point)),
             }
         }
         state.busy_threads -= 1;
@@ -249,7 +253,7 @@ impl Pool<'_> {
         if let Some(speeds) = &model.held_speeds {
             let is_stopped = || self.context.must_stop();
             let metrics = (speeds.values(), model.measures.metrics.as_slice());
-            let mut rows: Vec<_> = done
+            let mut rows: Vec<_> = finished_rows
                 .iter_mut()
                 .filter_map(|(outcome, point)| point.as_deref().ok().map(|point| (outcome, point)))
                 .collect();
@@ -259,48 +263,59 @@ impl Pool<'_> {
                 return;
             }
         }
-        done.iter().for_each(|(outcome, _)| (self.sink)(outcome));
+        finished_rows.iter().for_each(|(outcome, _)| (self.sink)(outcome));
     }
 }
 
 impl PoolState {
-    /// Chooses the next work of one of `threads` threads. `size` returns the size of a full batch
-    /// of a kind.
-    fn choose(&mut self, size: &dyn Fn(RunKind) -> usize, threads: usize) -> Work {
-        let is_full = |(kind, waiting): &(&RunKind, &Vec<u64>)| waiting.len() >= size(**kind);
-        let finest = self.waiting.iter().rfind(is_full).map(|(kind, _)| *kind);
-        if let Some(kind) = finest.or_else(|| self.overdue()) {
-            return self.take(kind, size(kind));
+    /// Chooses the next action of one of `threads` threads. `full_batch_size` returns the number of
+    /// runs of a full batch of a kind.
+    fn choose_action(
+        &mut self,
+        full_batch_size: &dyn Fn(RunKind) -> usize,
+        threads: usize,
+    ) -> ThreadAction {
+        let is_batch_full = |(kind, waiting_ids): &(&RunKind, &Vec<u64>)| {
+            waiting_ids.len() >= full_batch_size(**kind)
+        };
+        let finest_kind = self.waiting_rows.iter().rfind(is_batch_full).map(|(kind, _)| *kind);
+        if let Some(kind) = finest_kind.or_else(|| self.find_overdue_kind()) {
+            return self.take_batch(kind, full_batch_size(kind));
         }
         if !self.is_source_empty {
-            return Work::Prepare;
+            return ThreadAction::Prepare;
         }
-        let coarsest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
-        match coarsest.map(|(kind, waiting)| (*kind, waiting.len())) {
+        let coarsest_runs =
+            self.waiting_rows.iter().find(|(_, waiting_ids)| !waiting_ids.is_empty());
+        match coarsest_runs.map(|(kind, waiting_ids)| (*kind, waiting_ids.len())) {
             // Each thread takes its share, so that none waits for the last batch of another.
-            Some((kind, count)) => self.take(kind, count.div_ceil(threads).max(MAX_LANES)),
-            None if self.busy_threads == 0 => Work::End,
-            None => Work::Wait,
+            Some((kind, waiting_count)) => {
+                self.take_batch(kind, waiting_count.div_ceil(threads).max(MAX_LANES))
+            }
+            None if self.busy_threads == 0 => ThreadAction::End,
+            None => ThreadAction::Wait,
         }
     }
 
     /// Returns the kind of runs that a row has waited for too long, if any.
-    fn overdue(&self) -> Option<RunKind> {
-        let latest = self.queued.checked_sub(MAX_QUEUE_AGE)?;
-        let is_overdue = |id: &u64| self.rows.get(id).is_some_and(|row| row.sequence < latest);
-        let mut waiting = self.waiting.iter();
-        let finest = waiting.rfind(|(_, waiting)| waiting.first().is_some_and(is_overdue));
-        finest.map(|(kind, _)| *kind)
+    fn find_overdue_kind(&self) -> Option<RunKind> {
+        let min_sequence = self.queued_rows.checked_sub(MAX_QUEUE_AGE)?;
+        let is_overdue =
+            |id: &u64| self.tasks.get(id).is_some_and(|row| row.queue_sequence < min_sequence);
+        let mut waiting_by_kind = self.waiting_rows.iter();
+        let finest_runs =
+            waiting_by_kind.rfind(|(_, waiting_ids)| waiting_ids.first().is_some_and(is_overdue));
+        finest_runs.map(|(kind, _)| *kind)
     }
 
     /// Takes a batch of the rows that wait first, the longest trajectories first.
-    fn take(&mut self, kind: RunKind, most: usize) -> Work {
-        let waiting = self.waiting.entry(kind).or_default();
-        let mut positions: Vec<u64> = waiting.drain(..waiting.len().min(most)).collect();
-        let steps = |id: &u64| self.rows.get(id).map(|row| row.refinement.steps(kind.1));
-        positions.sort_by_key(|id| Reverse(steps(id)));
-        let point =
-            |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
-        Work::Runs(kind, positions.iter().filter_map(point).collect())
+    fn take_batch(&mut self, kind: RunKind, max_count: usize) -> ThreadAction {
+        let waiting_ids = self.waiting_rows.entry(kind).or_default();
+        let mut row_ids: Vec<u64> = waiting_ids.drain(..waiting_ids.len().min(max_count)).collect();
+        let step_count = |id: &u64| self.tasks.get(id).map(|row| row.refinement.steps(kind.1));
+        row_ids.sort_by_key(|id| Reverse(step_count(id)));
+        let id_and_point =
+            |row_id: &u64| Some((*row_id, self.tasks.get(row_id)?.point.clone().ok()?));
+        ThreadAction::Runs(kind, row_ids.iter().filter_map(id_and_point).collect())
     }
 }
