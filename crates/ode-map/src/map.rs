@@ -115,9 +115,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
                 range,
                 source,
                 value,
-                parts: vec![Cow::Borrowed(name)],
+                number_names: vec![Cow::Borrowed(name)],
                 window_edge: window_end_index,
-                is_in_grid: window_end_index.is_some(),
+                is_from_grid_file: window_end_index.is_some(),
                 handle,
             }
         };
@@ -134,7 +134,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Mod
             let name_and_value = |(parameter, value): (&OscillatorParameter, f64)| {
                 (parameter.name.to_owned(), Value::from(value))
             };
-            keys.write("parameters", parameters_with_values.map(name_and_value).collect());
+            keys.write_value("parameters", parameters_with_values.map(name_and_value).collect());
         }
     }
 

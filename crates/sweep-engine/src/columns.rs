@@ -149,7 +149,7 @@ impl<R: 'static> ComparisonColumns<'_, R> {
     /// Creates the columns of both models' amplitudes and of the ratios. `amplitude` and `ratio`
     /// describe them.
     pub fn amplitude_columns(&self, amplitude: &str, ratio: &str) -> Vec<ResultColumn<R>> {
-        let compared = self.row_comparison;
+        let row_comparison = self.row_comparison;
         let mut columns = Vec::new();
         for (k, model) in MODEL_NAMES.into_iter().enumerate() {
             for (i, channel) in self.channels.iter().enumerate() {
@@ -157,16 +157,18 @@ impl<R: 'static> ComparisonColumns<'_, R> {
                 let column_description =
                     format!("{motion}: {amplitude}, {model} model; null if it failed");
                 let name = format!("{model}_{}", channel.name);
-                let get = move |row: &R| compared(row).amplitudes[k].get(i).copied();
-                let column = ResultColumn::measured(name, channel.unit, column_description, get);
+                let cell_of_row = move |row: &R| row_comparison(row).amplitudes[k].get(i).copied();
+                let column =
+                    ResultColumn::measured(name, channel.unit, column_description, cell_of_row);
                 columns.push(column.worse(Worse::Greater));
             }
         }
         for (i, channel) in self.channels.iter().enumerate() {
             let column_description = format!("{}: {ratio}", channel.description);
             let name = format!("ratio_{}", channel.name);
-            let get = move |row: &R| compared(row).verdict.ratios.get(i).copied().flatten();
-            let column = ResultColumn::measured(name, "1", column_description, get);
+            let cell_of_row =
+                move |row: &R| row_comparison(row).verdict.ratios.get(i).copied().flatten();
+            let column = ResultColumn::measured(name, "1", column_description, cell_of_row);
             columns.push(column.worse(Worse::Greater).limit(self.limits.upper, 1.0));
         }
         columns
@@ -180,7 +182,7 @@ impl<R: 'static> ComparisonColumns<'_, R> {
         methods: Vec<&'static str>,
         method_description: &str,
     ) -> Vec<ResultColumn<R>> {
-        let compared = self.row_comparison;
+        let row_comparison = self.row_comparison;
         let RatioLimits { upper, lower } = self.limits;
         let mut columns =
             self.extreme_ratio_columns("max", |verdict| verdict.greatest, Worse::Greater, upper);
@@ -207,20 +209,20 @@ impl<R: 'static> ComparisonColumns<'_, R> {
             "true where error is within the accuracy asked for; null where nothing was compared";
         columns.extend([
             ResultColumn::flag("reliable", reliable_rule, move |row| {
-                compared(row).verdict.reliable
+                row_comparison(row).verdict.reliable
             }),
             ResultColumn::flag("sensitive", sensitive_description, move |row| {
-                compared(row).is_sensitive
+                row_comparison(row).is_sensitive
             }),
             ResultColumn::name("method", method_description, methods, move |row| {
-                Some(compared(row).method_index)
+                Some(row_comparison(row).method_index)
             }),
             ResultColumn::measured("error", "1", error_description, move |row| {
-                compared(row).relative_error
+                row_comparison(row).relative_error
             })
             .worse(Worse::Greater),
             ResultColumn::flag("converged", converged_description, move |row| {
-                compared(row).is_converged
+                row_comparison(row).is_converged
             }),
         ]);
         columns
@@ -234,13 +236,15 @@ impl<R: 'static> ComparisonColumns<'_, R> {
         worse: Worse,
         limit: f64,
     ) -> Vec<ResultColumn<R>> {
-        let compared = self.row_comparison;
+        let row_comparison = self.row_comparison;
         let channel_names = self.channels.iter().map(|channel| channel.name).collect();
-        let ratio_of_row =
-            move |row: &R| extreme(compared(row).verdict).map(|(_, ratio_of_row)| ratio_of_row);
-        let channel = move |row: &R| extreme(compared(row).verdict).map(|(channel, _)| channel);
+        let ratio_of_row = move |row: &R| {
+            extreme(row_comparison(row).verdict).map(|(_, ratio_of_row)| ratio_of_row)
+        };
+        let channel =
+            move |row: &R| extreme(row_comparison(row).verdict).map(|(channel, _)| channel);
         let ratio_description =
-            format!("{} of the defined ratios; null if none is", worse.extreme());
+            format!("{} of the defined ratios; null if none is", worse.worst_value_word());
         let channel_description =
             format!("channel of ratio_{name}; the first of the plan's channels wins a tie");
         vec![
@@ -258,15 +262,15 @@ impl<R: 'static> ComparisonColumns<'_, R> {
 
     /// Creates the columns of status and steps of the two integrations, which every plan has.
     pub fn run_columns(&self, statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
-        let compared = self.row_comparison;
+        let row_comparison = self.row_comparison;
         let status_description = "ok, or why the nonlinear model failed, or behind linear_ why the \
                                   linear model alone did";
         let fail_time_description =
             "when the model named by status failed; null if none did or it never started";
-        let fail_time_cell = move |row: &R| compared(row).fail_time_s.map(f64::to_bits);
+        let fail_time_cell = move |row: &R| row_comparison(row).fail_time_s.map(f64::to_bits);
         let mut columns = vec![
             ResultColumn::name("status", status_description, statuses, move |row| {
-                Some(compared(row).status_index)
+                Some(row_comparison(row).status_index)
             }),
             ResultColumn::new(
                 "fail_time_s",
@@ -285,7 +289,7 @@ impl<R: 'static> ComparisonColumns<'_, R> {
             for (k, model) in MODEL_NAMES.into_iter().enumerate() {
                 let count_description = format!("{kind} integration steps, {model} model");
                 let name = format!("{name}_{model}");
-                let cell = move |row: &R| Some(count(compared(row))[k]);
+                let cell = move |row: &R| Some(count(row_comparison(row))[k]);
                 columns.push(ResultColumn::new(
                     name,
                     "1",

@@ -120,13 +120,15 @@ impl<'a> CachedEvaluator<'a> {
                 scope.spawn(|_| {
                     let sender = sender;
                     let sink = |result: PointRows| {
-                        let request = result.point / points_per_request;
-                        let Some(results) =
-                            incomplete_requests.add_result(request, points_per_request, result)
-                        else {
+                        let request_index = result.point / points_per_request;
+                        let Some(results) = incomplete_requests.add_result(
+                            request_index,
+                            points_per_request,
+                            result,
+                        ) else {
                             return;
                         };
-                        let k = request as usize;
+                        let k = request_index as usize;
                         // The receiver outlives the engine's work.
                         let _ = sender.send((k, reduce(k, results)));
                     };

@@ -191,7 +191,7 @@ impl AxisValues {
     /// bits of NumPy's `linspace`, and logarithmic ones use no platform's `pow`.
     ///
     /// # Panics
-    /// On an axis without values.
+    /// Panics on an axis without values.
     pub fn value(&self, i: u64) -> f64 {
         let (from, to, count) = match *self {
             Self::List(ref values) => {
@@ -227,7 +227,7 @@ impl AxisValues {
     /// Returns the least and the greatest value.
     ///
     /// # Panics
-    /// On an axis without values.
+    /// Panics on an axis without values.
     pub fn extremes(&self) -> [f64; 2] {
         let end_values = [0, self.len() - 1].map(|i| self.value(i));
         let values = if let Self::List(values) = self { values } else { &end_values[..] };

@@ -86,12 +86,12 @@ impl Progress {
 
     /// Shows that `done` points are done.
     pub fn show(&self, done: u64) {
-        self.update(done, || self.format_line(done));
+        self.update_display(done, || self.format_line(done));
     }
 
     /// Shows that `done` units of a search are done, with a number of points.
     pub fn show_search(&self, done: u64, points: u64) {
-        self.update(done, || self.format_search_line(done, points));
+        self.update_display(done, || self.format_search_line(done, points));
     }
 
     fn format_search_line(&self, done: u64, points: u64) -> String {
@@ -104,7 +104,7 @@ impl Progress {
     }
 
     /// Updates the bar, or writes a line if the last one is old enough.
-    fn update(&self, position: u64, text: impl FnOnce() -> String) {
+    fn update_display(&self, position: u64, text: impl FnOnce() -> String) {
         // A thread does not wait while another one updates the display.
         let Ok(mut display) = self.display.try_lock() else { return };
         match &mut *display {

@@ -44,9 +44,9 @@ pub struct RunOptions<'a> {
     pub shard: Option<ShardRequest>,
     /// The form in which progress is shown.
     pub progress: ProgressMode,
-    /// Looks up the scheduler's variables.
+    /// The function that looks up the scheduler's variables.
     pub environment: Environment<'a>,
-    /// Shows messages to the user before the work starts.
+    /// The function that shows messages to the user before the work starts.
     pub show_message: &'a dyn Fn(&str),
 }
 

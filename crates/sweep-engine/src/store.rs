@@ -140,10 +140,11 @@ pub fn note_idle_shards(points: u64, shards: u64) -> Option<String> {
     let chunks = points.div_ceil(points_per_chunk);
     (shards > chunks).then(|| {
         let idle_count = shards - chunks;
-        let size =
+        let chunks_text =
             format!("{} of {points_per_chunk} points", format_count(chunks as usize, "chunk"));
         format!(
-            "note: with {size}, the run leaves {idle_count} of the {shards} shards without work"
+            "note: with {chunks_text}, the run leaves {idle_count} of the {shards} shards without \
+             work"
         )
     })
 }
@@ -168,12 +169,12 @@ impl Folder {
     /// Returns the paths of the run with this output. Files that already exist at the output or its
     /// sidecar must be of this program.
     pub fn new(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
-        let folder = Self::beside(output, layout.kind)?;
-        files::check_replaceable(&folder.sidecar(), folder.sidecar_kind())?;
+        let folder = Self::next_to_output(output, layout.kind)?;
+        files::check_replaceable(&folder.sidecar_path(), folder.sidecar_kind())?;
         Ok(folder)
     }
 
-    fn beside(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
+    fn next_to_output(output: &Path, kind: FileKind<'_>) -> Result<Self, StoreError> {
         files::check_replaceable(output, kind)?;
         let mut name = output.file_name().unwrap_or_default().to_owned();
         name.push(".partial");
@@ -187,7 +188,7 @@ impl Folder {
 
     /// Returns the path of the sidecar: the JSON file beside the result that describes how the run
     /// went.
-    fn sidecar(&self) -> PathBuf {
+    fn sidecar_path(&self) -> PathBuf {
         files::path_beside(&self.output, "run.json")
     }
 

@@ -24,12 +24,12 @@ pub struct Parameter<H> {
     /// The model's own value, if it has one number for the parameter.
     pub value: Option<f64>,
     /// The names of the single numbers that the parameter writes; usually its own name alone.
-    pub parts: Vec<Cow<'static, str>>,
+    pub number_names: Vec<Cow<'static, str>>,
     /// The edge of the window that this parameter sets (0: the beginning, 1: the end), if it sets
     /// one. The window is part of the plan, not of the model.
     pub window_edge: Option<usize>,
     /// Whether a section of the grid file gives the value, so that there is none without a file.
-    pub is_in_grid: bool,
+    pub is_from_grid_file: bool,
     /// The model's handle, by which it writes a value.
     pub handle: H,
 }
@@ -78,8 +78,8 @@ impl fmt::Display for UnknownParameter {
     }
 }
 
-/// Values that a parameter may take. No number above [`Range::LARGEST`] in magnitude is accepted,
-/// so that products of a few parameters stay finite.
+/// Values that a parameter may take. No number above [`Range::MAX_MAGNITUDE`] in magnitude is
+/// accepted, so that products of a few parameters stay finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
     /// Any finite number.
@@ -97,18 +97,18 @@ pub enum Range {
 impl Range {
     /// Greatest magnitude of any parameter, in its own unit. Basis: products of a few of them, and
     /// the squares of such products, stay finite. Doubling it makes no difference.
-    pub const LARGEST: f64 = 1e12;
+    pub const MAX_MAGNITUDE: f64 = 1e12;
 
-    /// Whether `value` is allowed; NaN and infinity never are.
+    /// Returns whether `value` is allowed; NaN and infinity never are.
     pub fn contains(self, value: f64) -> bool {
         let [least, greatest] = self.bounds();
-        value.abs() <= Self::LARGEST
+        value.abs() <= Self::MAX_MAGNITUDE
             && (least..=greatest).contains(&value)
             && !(value == 0.0 && self.excludes_zero())
     }
 
-    /// Returns the least and the greatest value. They are infinite where only [`Self::LARGEST`]
-    /// limits them.
+    /// Returns the least and the greatest value. They are infinite where only
+    /// [`Self::MAX_MAGNITUDE`] limits them.
     pub const fn bounds(self) -> [f64; 2] {
         match self {
             Self::Any => [f64::NEG_INFINITY, f64::INFINITY],
@@ -118,15 +118,18 @@ impl Range {
         }
     }
 
-    /// Whether 0 is a bound that is itself not allowed.
+    /// Returns whether 0 is a bound that is itself not allowed.
     pub const fn excludes_zero(self) -> bool {
         matches!(self, Self::Positive | Self::Negative)
     }
 
     /// Describes the allowed values, for the message about a refused `value`.
     pub fn describe_for(self, value: f64) -> String {
-        if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
-            format!("{self}, at most {:e} in magnitude", Self::LARGEST)
+        if value.is_finite()
+            && value.abs() > Self::MAX_MAGNITUDE
+            && !matches!(self, Self::Within(..))
+        {
+            format!("{self}, at most {:e} in magnitude", Self::MAX_MAGNITUDE)
         } else {
             self.to_string()
         }
@@ -145,7 +148,7 @@ named! {
 
 impl Worse {
     /// Returns the word for the worst value: greatest or least.
-    pub const fn extreme(self) -> &'static str {
+    pub const fn worst_value_word(self) -> &'static str {
         match self {
             Self::Greater => "greatest",
             Self::Less => "least",
@@ -153,7 +156,7 @@ impl Worse {
     }
 
     /// Returns the word for the bad side of a limit: above or below.
-    pub const fn bad_side(self) -> &'static str {
+    pub const fn bad_side_word(self) -> &'static str {
         match self {
             Self::Greater => "above",
             Self::Less => "below",
@@ -197,8 +200,8 @@ impl From<f64> for RatioLimits {
 }
 
 impl RatioLimits {
-    /// Whether these least and greatest ratios of a point are within the limits.
-    pub fn contain(self, least: f64, greatest: f64) -> bool {
+    /// Returns whether these least and greatest ratios of a point are within the limits.
+    pub fn contain_ratios(self, least: f64, greatest: f64) -> bool {
         greatest < self.upper && self.lower.is_none_or(|limit| least > limit)
     }
 
@@ -212,7 +215,7 @@ impl RatioLimits {
 
     /// Returns the ratio below which the linear model over-estimates too much: the lower limit, or
     /// without one the reciprocal of the upper limit.
-    pub fn over_estimate(self) -> f64 {
+    pub fn over_estimate_limit(self) -> f64 {
         self.lower.unwrap_or(1.0 / self.upper)
     }
 }
@@ -245,7 +248,7 @@ impl Verdict {
         let greatest = extreme(|a, b| a > b);
         let least = extreme(|a, b| a < b);
         let extremes = least.zip(greatest).map(|((_, least), (_, greatest))| (least, greatest));
-        let reliable = extremes.map(|(least, greatest)| limits.contain(least, greatest));
+        let reliable = extremes.map(|(least, greatest)| limits.contain_ratios(least, greatest));
         let margin = extremes.map(|(least, greatest)| limits.margin(least, greatest));
         Self { ratios, greatest, least, reliable, margin }
     }

@@ -305,7 +305,10 @@ impl ShownColumn {
         match (self.column_group, &self.channel, label::split_model(self.name())) {
             (_, Some(channel), _) => capitalise(&label::channel_in_words(channel)),
             (ColumnGroup::Ratio, None, _) => {
-                format!("{} ratio", capitalise(self.worse().unwrap_or(Worse::Greater).extreme()))
+                format!(
+                    "{} ratio",
+                    capitalise(self.worse().unwrap_or(Worse::Greater).worst_value_word())
+                )
             }
             (_, None, (words, "")) => capitalise(&words),
             (_, None, (words, model)) => format!("{}, {model} model", capitalise(&words)),

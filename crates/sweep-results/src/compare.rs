@@ -312,7 +312,7 @@ fn count_over_estimated(
     shared_rows: &[SharedRow],
 ) -> Option<[usize; 2]> {
     let count_in_file = |file: usize| {
-        let limit = ratio_limits(tables[file].plan.as_ref()?)?.over_estimate();
+        let limit = ratio_limits(tables[file].plan.as_ref()?)?.over_estimate_limit();
         let is_below = |row: &&SharedRow| row.least_ratios[file].is_some_and(|least| least < limit);
         Some(shared_rows.iter().filter(is_below).count())
     };

@@ -29,12 +29,12 @@ pub(crate) fn engine_parameter(
         range: parameter.range(),
         source: parameter.source(),
         value: parameter.get(machine, spin),
-        parts: parameter.single_names(machine),
+        number_names: parameter.single_names(machine),
         window_edge: match parameter.target() {
             Target::Window(edge) => Some(edge),
             _ => None,
         },
-        is_in_grid: matches!(parameter.target(), Target::Spin | Target::Window(_)),
+        is_from_grid_file: matches!(parameter.target(), Target::Spin | Target::Window(_)),
         handle: parameter,
     }
 }

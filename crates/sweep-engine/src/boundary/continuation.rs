@@ -25,7 +25,7 @@ pub(super) struct Neighbour<'a> {
 }
 
 impl Neighbour<'_> {
-    /// Whether another line has the same sides in the same order.
+    /// Returns whether another line has the same sides in the same order.
     pub(super) fn agrees_with(&self, other: &Self) -> bool {
         let own_sides = self.intervals.iter().map(|interval| interval.side);
         own_sides.eq(other.intervals.iter().map(|interval| interval.side))
@@ -153,7 +153,7 @@ impl LinePair<'_> {
         let second_neighbour = self
             .second_neighbour
             .filter(|second_neighbour| second_neighbour.agrees_with(&self.neighbour));
-        let shared = find_shared_crossings(self.line.intervals, self.neighbour.intervals);
+        let shared_positions = find_shared_crossings(self.line.intervals, self.neighbour.intervals);
         let displacement_at = |k: usize, position: f64| match second_neighbour {
             Some(second_neighbour) => {
                 let slope = (position - second_neighbour.intervals[k].from)
@@ -162,8 +162,9 @@ impl LinePair<'_> {
             }
             None => {
                 let distance_to = |pair: &&[f64; 2]| (pair[1] - position).abs();
-                let nearest_crossing =
-                    shared.iter().min_by(|a, b| distance_to(a).total_cmp(&distance_to(b)));
+                let nearest_crossing = shared_positions
+                    .iter()
+                    .min_by(|a, b| distance_to(a).total_cmp(&distance_to(b)));
                 nearest_crossing.map_or(0.0, |[own, neighbours]| own - neighbours)
             }
         };
@@ -240,7 +241,7 @@ mod tests {
     use super::*;
 
     const SPAN: Span = Span { least: 0.0, greatest: 100.0, tolerance: 1.0 };
-    const CELL: f64 = 20.0;
+    const CELL_WIDTH: f64 = 20.0;
 
     /// Returns intervals that change sides at these positions; the first one is unreliable.
     fn intervals(crossings: &[f64]) -> Vec<SideInterval> {
@@ -259,21 +260,21 @@ mod tests {
     }
 
     fn find_disputed(
-        own: &[f64],
+        own_crossings: &[f64],
         neighbour: &[f64],
         second_neighbour: Option<&[f64]>,
     ) -> Vec<[f64; 2]> {
-        let own = intervals(own);
+        let own_crossings = intervals(own_crossings);
         let neighbour = intervals(neighbour);
         let second_neighbour = second_neighbour.map(intervals);
         let pair = LinePair {
-            line: Neighbour { position: 3.0, intervals: &own },
+            line: Neighbour { position: 3.0, intervals: &own_crossings },
             neighbour: Neighbour { position: 2.0, intervals: &neighbour },
             second_neighbour: second_neighbour
                 .as_ref()
                 .map(|intervals| Neighbour { position: 1.0, intervals }),
         };
-        pair.find_disputed_intervals(CELL, &SPAN)
+        pair.find_disputed_intervals(CELL_WIDTH, &SPAN)
     }
 
     #[test]
@@ -293,8 +294,14 @@ mod tests {
             let right = intervals(b);
             let left = Neighbour { position: 0.0, intervals: &left };
             let right = Neighbour { position: 2.0, intervals: &right };
-            let predicted = predict_sides(1.0, &[vec![left], vec![right]], CELL, &SPAN)?;
-            Some(predicted.iter().map(|predicted| (predicted.position, predicted.side)).collect())
+            let predicted_sides =
+                predict_sides(1.0, &[vec![left], vec![right]], CELL_WIDTH, &SPAN)?;
+            Some(
+                predicted_sides
+                    .iter()
+                    .map(|predicted_sides| (predicted_sides.position, predicted_sides.side))
+                    .collect(),
+            )
         };
         let reliable = LimitSide::Reliable;
         let unreliable = LimitSide::Unreliable;

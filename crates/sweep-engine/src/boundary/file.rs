@@ -30,11 +30,11 @@ impl<M: Model> BoundaryTask<M> {
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::new(&self.plan);
         job.layout.kind = FileKind::Boundary;
-        job.plan["boundary"] = self.settings();
+        job.plan["boundary"] = self.settings_json();
         job
     }
 
-    fn settings(&self) -> Value {
+    fn settings_json(&self) -> Value {
         json!({
             "quantity": self.quantity.name,
             "limit": self.quantity.limit,
@@ -45,7 +45,7 @@ impl<M: Model> BoundaryTask<M> {
 
     /// Returns the table of the traced curves.
     pub fn table(&self, traced_boundary: &TracedBoundary) -> Table {
-        let mut search_metadata = self.settings();
+        let mut search_metadata = self.settings_json();
         search_metadata["worse"] = self.quantity.worse.name().into();
         search_metadata["points"] = traced_boundary.trial_count.into();
         search_metadata["rounds"] = traced_boundary.batch_count.into();

@@ -93,19 +93,20 @@ mod tests {
         println!("seed {seed}");
         let mut random = fastrand::Rng::with_seed(seed as u64);
         for _ in 0..1000 {
-            let ends = [-100.0 * random.f64() - 1e-3, 100.0 * random.f64() + 1e-3];
+            let bracket_ends = [-100.0 * random.f64() - 1e-3, 100.0 * random.f64() + 1e-3];
             let tolerance = 10.0_f64.powf(-3.0 * random.f64());
             let steepness = 10.0_f64.powf(4.0 * random.f64() - 2.0);
             let skew = 10.0_f64.powf(6.0 * random.f64() - 3.0);
             let saturated_function =
                 |x: f64| (steepness * x).tanh() * if x < 0.0 { skew } else { 1.0 };
             let flat_function = |x: f64| steepness * x.powi(9) + 1e-9 * x;
-            let bisections = ((ends[1] - ends[0]) / tolerance).log2().ceil().max(0.0) as usize;
+            let bisections =
+                ((bracket_ends[1] - bracket_ends[0]) / tolerance).log2().ceil().max(0.0) as usize;
             for function in [&saturated_function as &dyn Fn(f64) -> f64, &flat_function] {
-                let count = count_evaluations(function, ends, tolerance);
+                let count = count_evaluations(function, bracket_ends, tolerance);
                 assert!(
                     count <= bisections + 1,
-                    "{count} > {bisections} + 1: {ends:?} {tolerance}"
+                    "{count} > {bisections} + 1: {bracket_ends:?} {tolerance}"
                 );
             }
         }

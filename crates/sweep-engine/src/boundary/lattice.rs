@@ -56,23 +56,23 @@ pub(super) fn plan_lines(positions: &[f64], cells: usize) -> Vec<PlannedLine> {
     lines.sort_by(|a, b| a.position.total_cmp(&b.position));
     let mut planned_ranks = lattice_ranks(lines.len(), cells);
     loop {
-        let mut middles = Vec::new();
+        let mut middle_ranks = Vec::new();
         for right in 1..planned_ranks.len() {
-            let gap = planned_ranks[right] - planned_ranks[right - 1];
-            if gap > 1 {
-                let middle = planned_ranks[right - 1] + gap / 2;
+            let rank_gap = planned_ranks[right] - planned_ranks[right - 1];
+            if rank_gap > 1 {
+                let middle = planned_ranks[right - 1] + rank_gap / 2;
                 let left_parents =
                     planned_ranks[..right].iter().rev().take(MAX_PARENTS).copied().collect();
                 let right_parents =
                     planned_ranks[right..].iter().take(MAX_PARENTS).copied().collect();
                 lines[middle].parents = [left_parents, right_parents];
-                middles.push(middle);
+                middle_ranks.push(middle);
             }
         }
-        if middles.is_empty() {
+        if middle_ranks.is_empty() {
             return lines;
         }
-        planned_ranks.extend(middles);
+        planned_ranks.extend(middle_ranks);
         planned_ranks.sort_unstable();
     }
 }
@@ -88,19 +88,19 @@ mod tests {
                 // In falling order: ranks are not indices.
                 let positions: Vec<f64> = (0..count).rev().map(f64::from).collect();
                 let lines = plan_lines(&positions, cells);
-                let mut planned = vec![false; lines.len()];
+                let mut planned_flags = vec![false; lines.len()];
                 for rank in lattice_ranks(lines.len(), cells) {
                     assert!(lines[rank].is_lattice_line());
-                    planned[rank] = true;
+                    planned_flags[rank] = true;
                 }
                 for _ in 0..lines.len() {
                     for rank in 0..lines.len() {
                         let parents = lines[rank].parents.concat();
-                        planned[rank] |=
-                            !parents.is_empty() && parents.iter().all(|parent| planned[*parent]);
+                        planned_flags[rank] |= !parents.is_empty()
+                            && parents.iter().all(|parent| planned_flags[*parent]);
                     }
                 }
-                assert!(planned.iter().all(|is_planned| *is_planned), "{count} {cells}");
+                assert!(planned_flags.iter().all(|is_planned| *is_planned), "{count} {cells}");
                 assert!(lines.iter().all(|line| positions[line.value_index] == line.position));
             }
         }

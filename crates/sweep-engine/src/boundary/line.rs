@@ -31,7 +31,11 @@ pub(super) struct LineSearch {
 
 impl LineSearch {
     /// Requests samples at these positions, clamped to the range, except where samples exist.
-    pub(super) fn request(&mut self, positions: impl IntoIterator<Item = f64>, span: &Span) {
+    pub(super) fn request_samples(
+        &mut self,
+        positions: impl IntoIterator<Item = f64>,
+        span: &Span,
+    ) {
         for requested in positions {
             let position = requested.clamp(span.least, span.greatest);
             if self.sample_at(position).is_none() {
@@ -42,12 +46,12 @@ impl LineSearch {
         self.requested_positions.dedup();
     }
 
-    /// Whether some requested positions have not been taken yet.
+    /// Returns whether some requested positions have not been taken yet.
     pub(super) fn has_requests(&self) -> bool {
         !self.requested_positions.is_empty()
     }
 
-    pub(super) fn insert(&mut self, sample: LineSample) {
+    pub(super) fn insert_sample(&mut self, sample: LineSample) {
         let index = self.samples.partition_point(|other| other.position < sample.position);
         if self.samples.get(index).is_none_or(|other| other.position != sample.position) {
             self.samples.insert(index, sample);
@@ -61,7 +65,7 @@ impl LineSearch {
         self.samples.get(index)
     }
 
-    /// Whether the sample at this position is on the side that is predicted.
+    /// Returns whether the sample at this position is on the side that is predicted.
     pub(super) fn confirms(&self, predicted: &PredictedSide) -> bool {
         self.sample_at(predicted.position).is_some_and(|sample| sample.side() == predicted.side)
     }
@@ -108,7 +112,12 @@ impl LineSearch {
     /// `widest`. If there are any, a position beyond either end is added, so that a side that
     /// appears in the interval has narrow brackets. No position is within half a tolerance of a
     /// sample.
-    pub(super) fn subdivide(&self, interval: [f64; 2], max_gap: f64, span: &Span) -> Vec<f64> {
+    pub(super) fn subdividing_positions(
+        &self,
+        interval: [f64; 2],
+        max_gap: f64,
+        span: &Span,
+    ) -> Vec<f64> {
         let [from, to] = interval;
         let sample_positions = self
             .samples
@@ -139,12 +148,12 @@ impl LineSearch {
 
     /// Iterates over neighbouring samples on different sides.
     fn sample_brackets(&self) -> impl Iterator<Item = [LineSample; 2]> + '_ {
-        let pairs = self.samples.windows(2).map(|pair| [pair[0], pair[1]]);
-        pairs.filter(|[low, high]| low.side() != high.side())
+        let sample_pairs = self.samples.windows(2).map(|pair| [pair[0], pair[1]]);
+        sample_pairs.filter(|[low, high]| low.side() != high.side())
     }
 
     /// Returns the intervals of one side in order; none before the first sample.
-    pub(super) fn intervals(&self, span: &Span) -> Vec<SideInterval> {
+    pub(super) fn side_intervals(&self, span: &Span) -> Vec<SideInterval> {
         let mut intervals = Vec::new();
         let mut from = span.least;
         for [low, high] in self.sample_brackets() {
@@ -205,7 +214,8 @@ impl LineSearch {
     }
 }
 
-/// Whether a bracket has to be narrowed: it is wider than the tolerance, or may contain a jump.
+/// Returns whether a bracket has to be narrowed: it is wider than the tolerance, or may contain a
+/// jump.
 fn needs_narrowing(low: &LineSample, high: &LineSample, span: &Span) -> bool {
     let width = high.position - low.position;
     let middle = 0.5 * (low.position + high.position);

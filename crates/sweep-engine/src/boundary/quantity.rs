@@ -77,7 +77,8 @@ pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<
         (plan, Some(channel_column_names(channel.name)))
     };
     let mut plan_with_lower_limit = plan.clone();
-    plan_with_lower_limit.reliability.limits.lower = Some(plan.reliability.limits.over_estimate());
+    plan_with_lower_limit.reliability.limits.lower =
+        Some(plan.reliability.limits.over_estimate_limit());
     let other_plans = [plan.clone(), plan_with_lower_limit].into_iter().chain(M::variants(plan));
     let plans =
         M::ABOUT.channels.iter().map(plan_of_channel).chain(other_plans.map(|plan| (plan, None)));

@@ -144,11 +144,11 @@ impl<'a> CurveGroup<'a> {
                 }
             }
             for (rank, positions) in self.find_disputes(curve) {
-                let state = &mut self.curves[curve][rank];
-                let Some(search) = &mut state.search else { continue };
-                state.disputed_samples += positions.len();
-                state.is_traced = false;
-                search.request(positions, &self.span);
+                let line_state = &mut self.curves[curve][rank];
+                let Some(search) = &mut line_state.search else { continue };
+                line_state.disputed_samples += positions.len();
+                line_state.is_traced = false;
+                search.request_samples(positions, &self.span);
                 self.request_trials(curve, rank, &mut batch);
             }
         }
@@ -157,14 +157,11 @@ impl<'a> CurveGroup<'a> {
 
     /// Adds the trials that a line needs next to the batch.
     fn request_trials(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
-        let first = self.first_values[self.lines[rank].value_index];
+        let first_value = self.first_values[self.lines[rank].value_index];
         for position in self.next_positions(curve, rank) {
-            let second = self.search.value(position);
-            let trial = BoundaryTrial {
-                curve_index: self.first_curve + curve,
-                first_value: first,
-                second_value: second,
-            };
+            let second_value = self.search.value(position);
+            let trial =
+                BoundaryTrial { curve_index: self.first_curve + curve, first_value, second_value };
             batch.push(TrialRequest { trial, curve, rank, position });
         }
     }
@@ -173,33 +170,34 @@ impl<'a> CurveGroup<'a> {
     /// a prediction failed, steps in brackets, or else those of the search for pairs of roots.
     fn next_positions(&mut self, curve: usize, rank: usize) -> Vec<f64> {
         let span = self.span;
-        let state = &mut self.curves[curve][rank];
-        let Some(search) = state.search.as_mut().filter(|_| !state.is_traced) else {
+        let line_state = &mut self.curves[curve][rank];
+        let Some(search) = line_state.search.as_mut().filter(|_| !line_state.is_traced) else {
             return Vec::new();
         };
         if !search.has_requests() {
-            let predicted = std::mem::take(&mut state.predicted_sides);
-            if !predicted.iter().all(|predicted| search.confirms(predicted)) {
-                search.request(self.columns.iter().copied(), &span);
+            let predicted_sides = std::mem::take(&mut line_state.predicted_sides);
+            if !predicted_sides.iter().all(|predicted_sides| search.confirms(predicted_sides)) {
+                search.request_samples(self.columns.iter().copied(), &span);
             }
         }
         let positions = search.take_positions(&span);
         if !positions.is_empty() {
-            state.intervals = None;
+            line_state.intervals = None;
             return positions;
         }
         // Other lines begin from these intervals while the search for pairs of roots goes on.
-        state.intervals = Some(search.intervals(&span));
+        line_state.intervals = Some(search.side_intervals(&span));
         if self.lines[rank].is_lattice_line() {
             let min_gap = (MIN_GAP_FRACTION * self.cell_width).max(span.tolerance);
-            search.request(lipschitz::candidate_positions(search.samples(), min_gap), &span);
+            search
+                .request_samples(lipschitz::candidate_positions(search.samples(), min_gap), &span);
         }
         let positions = search.take_positions(&span);
-        state.is_traced = positions.is_empty();
+        line_state.is_traced = positions.is_empty();
         positions
     }
 
-    /// Whether all brackets are narrow on the parents of a line.
+    /// Returns whether all brackets are narrow on the parents of a line.
     fn can_begin(&self, curve: usize, rank: usize) -> bool {
         let mut parents = self.lines[rank].parents.iter().flatten();
         parents.all(|parent| self.neighbour(curve, *parent).is_some())
@@ -217,9 +215,9 @@ impl<'a> CurveGroup<'a> {
         let predicted = predict_sides(line.position, &parents, self.cell_width, &self.span);
         match &predicted {
             Some(sides) => {
-                search.request(sides.iter().map(|predicted| predicted.position), &self.span)
+                search.request_samples(sides.iter().map(|predicted| predicted.position), &self.span)
             }
-            None => search.request(self.columns.iter().copied(), &self.span),
+            None => search.request_samples(self.columns.iter().copied(), &self.span),
         }
         let state = &mut self.curves[curve][rank];
         state.search = Some(search);
@@ -255,7 +253,7 @@ impl<'a> CurveGroup<'a> {
                     let width = interval[1] - interval[0];
                     let max_gap = DISPUTED_FRACTION * self.cell_width.min(width);
                     let max_gap = max_gap.max(0.5 * self.span.tolerance);
-                    positions.extend(search.subdivide(interval, max_gap, &self.span));
+                    positions.extend(search.subdividing_positions(interval, max_gap, &self.span));
                 }
             }
             if !positions.is_empty() {
@@ -268,7 +266,7 @@ impl<'a> CurveGroup<'a> {
     fn insert_distance(&mut self, request: &TrialRequest, distance: Option<f64>) {
         let distance = distance.filter(|distance| !distance.is_nan());
         if let Some(search) = &mut self.curves[request.curve][request.rank].search {
-            search.insert(LineSample { position: request.position, distance });
+            search.insert_sample(LineSample { position: request.position, distance });
         }
     }
 

@@ -81,10 +81,11 @@ fn format_summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let sampled_points =
         format_count(estimate.sample_statuses.values().sum::<u64>() as usize, "point");
     add_line("takes", describe_time(plan, estimate, &sampled_points));
-    let [memory, disk, result] =
+    let [memory_text, disk_text, result_text] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(format_bytes);
-    let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
-    add_line("", format!("{memory} of memory; {disk}"));
+    let disk_text =
+        format!("on disk {disk_text} while it runs, and at most {result_text} for the result");
+    add_line("", format!("{memory_text} of memory; {disk_text}"));
     if let Some(failures) = describe_failures(&estimate.sample_statuses) {
         add_line("failed", format!("{failures}, of {sampled_points} tried"));
     }
@@ -114,7 +115,7 @@ fn describe_time<M: Model>(plan: &Plan<M>, estimate: &Estimate, sampled_points: 
     )
 }
 
-/// Whether points were sampled, and every one of them failed.
+/// Returns whether points were sampled, and every one of them failed.
 fn have_all_points_failed(estimate: &Estimate) -> bool {
     let sampled_points = estimate.sample_statuses.values().sum::<u64>();
     sampled_points > 0 && count_failed(&estimate.sample_statuses) == sampled_points

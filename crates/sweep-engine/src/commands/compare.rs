@@ -13,7 +13,7 @@ use super::{Lines as _, format_number, format_range, format_table, quote_for_she
 use crate::config::section::{format_count, truncate};
 use crate::store::refuse_unfinished;
 use crate::{Error, Exit, Model, show, tell};
-use fail_on::FailOn;
+use fail_on::FailCriterion;
 use overridden::{OverriddenNumbers, find_overridden};
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalise;
@@ -42,8 +42,8 @@ pub struct CompareArgs {
     out: Option<PathBuf>,
     /// Exit with 4 if the files differ in WHAT: any, plan, flips, lost, sensitive, rows,
     /// ratio=PART, gap=M, boundary=WIDTH or COLUMN=CHANGE, as --help explains; may be repeated
-    #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
-    fail_on: Vec<FailOn>,
+    #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailCriterion>)]
+    fail_on: Vec<FailCriterion>,
     /// Maximum number of rows shown of each kind
     #[arg(long, value_name = "N", default_value_t = 5)]
     rows: u16,
@@ -78,9 +78,9 @@ Values of --fail-on:
 /// # Errors
 /// Files that cannot be read or compared, and an output that cannot be written.
 pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
-    let files = [&args.first, &args.second];
-    files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
-    let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
+    let compared_files = [&args.first, &args.second];
+    compared_files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
+    let tables = [ResultTable::open(compared_files[0])?, ResultTable::open(compared_files[1])?];
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
     let comparison = compare(&tables[0], &tables[1])?;
@@ -101,20 +101,24 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     }
     let violations: Vec<String> =
         args.fail_on.iter().filter_map(|fail_on| fail_on.describe_violation(&comparison)).collect();
-    let overridden = find_overridden::<M>(&tables, &comparison);
+    let overridden_numbers = find_overridden::<M>(&tables, &comparison);
     if args.json {
-        show(&format!("{:#}\n", to_json(args, &comparison, &overridden, &violations)))?;
+        show(&format!("{:#}\n", to_json(args, &comparison, &overridden_numbers, &violations)))?;
     } else if args.markdown {
-        show(&format_markdown(args, &comparison, &overridden, &violations))?;
+        show(&format_markdown(args, &comparison, &overridden_numbers, &violations))?;
     } else {
         let violation_lines =
             violations.iter().map(|violation| format!("--fail-on: {violation}\n"));
         show(
-            &(format_text(args, &comparison, &overridden) + &violation_lines.collect::<String>()),
+            &(format_text(args, &comparison, &overridden_numbers)
+                + &violation_lines.collect::<String>()),
         )?;
-        if let Some(out) = &args.out {
-            let out = out.display();
-            tell(&format!("wrote {out}: sweep plot {}", quote_for_shell(&out.to_string())));
+        if let Some(out_text) = &args.out {
+            let out_text = out_text.display();
+            tell(&format!(
+                "wrote {out_text}: sweep plot {}",
+                quote_for_shell(&out_text.to_string())
+            ));
         }
     }
     Ok(if violations.is_empty() { Exit::Done } else { Exit::ConditionViolated })
@@ -217,8 +221,12 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
 }
 
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
-fn column_table(fail_on: &FailOn, comparison: &Comparison, max_rows: usize) -> Option<TitledTable> {
-    let FailOn::Column(name, _) = fail_on else { return None };
+fn column_table(
+    fail_on: &FailCriterion,
+    comparison: &Comparison,
+    max_rows: usize,
+) -> Option<TitledTable> {
+    let FailCriterion::Column(name, _) = fail_on else { return None };
     let column = comparison.changed_columns.iter().find(|column| column.name == *name)?;
     let rows = column.worst_rows.iter().take(max_rows).map(|worst| {
         let [first, second] = worst.values;
@@ -285,9 +293,10 @@ fn summary_lines(
         let count_flips =
             |flip: Flip| comparison.flips(false).filter(|row| row.flip == flip).count();
         let [lost, gained, defined] = [Flip::Lost, Flip::Gained, Flip::Defined].map(count_flips);
-        let flips = format!("{lost} lost, {gained} gained, {defined} defined in one file alone");
+        let flip_text =
+            format!("{lost} lost, {gained} gained, {defined} defined in one file alone");
         let sensitive_flips = comparison.flips(true).count();
-        lines.push(("verdicts", format!("{flips}; of sensitive rows {sensitive_flips}")));
+        lines.push(("verdicts", format!("{flip_text}; of sensitive rows {sensitive_flips}")));
     }
     if let Some([first, second]) = comparison.over_estimated_rows.filter(|counts| *counts != [0, 0])
     {

@@ -45,11 +45,11 @@ pub fn list_parameters<M: Model>(plan: Option<&Plan<M>>) -> Vec<ListedParameter<
     let list_parameter = |parameter: ModelParameter<M>| {
         let value = match parameter.window_edge {
             Some(edge) => plan.map(|plan| plan.window_s[edge]),
-            None => parameter.value.filter(|_| plan.is_some() || !parameter.is_in_grid),
+            None => parameter.value.filter(|_| plan.is_some() || !parameter.is_from_grid_file),
         };
         // A parameter of several numbers has the sources of all of them.
-        let plan_source = plan.filter(|_| !parameter.is_in_grid);
-        let plan_source = plan_source.and_then(|plan| plan.sources.source(&parameter.parts));
+        let plan_source = plan.filter(|_| !parameter.is_from_grid_file);
+        let plan_source = plan_source.and_then(|plan| plan.sources.source(&parameter.number_names));
         let source = plan_source.unwrap_or_else(|| parameter.source.to_owned());
         ListedParameter { parameter, value, source }
     };

@@ -78,7 +78,7 @@ pub fn run<M: Model>(
     let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
     let range_text = limits.map_or_else(String::new, describe_range);
     let describe_over_estimates = |limits: RatioLimits| {
-        let limit_text = format_number(limits.over_estimate());
+        let limit_text = format_number(limits.over_estimate_limit());
         format!(
             " At {over_estimated}, the linear model over-estimates: a ratio is below {limit_text}."
         )

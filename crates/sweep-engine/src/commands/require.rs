@@ -75,10 +75,14 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
                 check_condition(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
             let parts =
                 check_parts(&file, condition, filter.as_ref(), args.allow_null, whole.holds)?;
-            Ok(ExpressionCheck { intervals: share_intervals(&whole, is_random), whole, parts })
+            Ok(ExpressionCheck {
+                intervals: share_intervals(&whole, is_random),
+                whole_check: whole,
+                parts,
+            })
         })
         .collect::<Result<Vec<ExpressionCheck>, Error>>()?;
-    let holds = expression_checks.iter().all(|expression_check| expression_check.whole.holds);
+    let holds = expression_checks.iter().all(|expression_check| expression_check.whole_check.holds);
     if args.json {
         let json = json!({
             "file": args.file.display().to_string(),
@@ -102,7 +106,7 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
 #[derive(Serialize)]
 struct ExpressionCheck {
     #[serde(flatten)]
-    whole: ConditionCheck,
+    whole_check: ConditionCheck,
     /// The 95 % confidence interval of each function over all rows; `None` for functions other than
     /// shares of random points.
     intervals: Vec<Option<[f64; 2]>>,
@@ -157,7 +161,7 @@ fn format_expression_check(
     is_random: bool,
 ) -> String {
     let mut text =
-        format_condition_check(args, &expression_check.whole, &expression_check.intervals);
+        format_condition_check(args, &expression_check.whole_check, &expression_check.intervals);
     for part in &expression_check.parts {
         let part_text = format_condition_check(args, part, &share_intervals(part, is_random));
         text.push_str(&format!("       {part_text}"));

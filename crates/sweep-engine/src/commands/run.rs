@@ -319,7 +319,7 @@ pub fn format_counts_at(
     text.push_str(&format_undefined_line(tally, axis_values));
     // An over-estimated row has a ratio, so that it has a verdict.
     if let Some(share) = verdict_share(*over_estimated, tally).filter(|_| *over_estimated > 0) {
-        let limit_text = format_number(limits.over_estimate());
+        let limit_text = format_number(limits.over_estimate_limit());
         let rows = format!("in {over_estimated} ({} %)", format_percent(share.fraction));
         let row_counts = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
         let description =
@@ -373,9 +373,9 @@ pub fn format_counts_at(
             format!("{column} {}{}", format_number(worst.value), location_text(worst.point));
         if let Some(limit) = limit.filter(|_| *rows_beyond > 0) {
             let rows = format_count(*rows_beyond as usize, "row");
-            extreme_text += &format!("; {rows} {} {}", worse.bad_side(), format_number(limit));
+            extreme_text += &format!("; {rows} {} {}", worse.bad_side_word(), format_number(limit));
         }
-        text.line(worse.extreme(), extreme_text);
+        text.line(worse.worst_value_word(), extreme_text);
     }
     text
 }

@@ -10,7 +10,7 @@ pub struct SchemaArgs {}
 /// Prints the schema of a model's grid files.
 ///
 /// # Errors
-/// When standard output cannot be written.
+/// Standard output that cannot be written.
 pub fn run<M: Model>(_: &SchemaArgs) -> Result<Exit, Error> {
     print(&format!("{:#}\n", grid_schema::<M>()))
 }

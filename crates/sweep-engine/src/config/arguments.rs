@@ -28,9 +28,9 @@ impl<'a> NamedArgument<'a> {
         };
         match argument.split_once('=') {
             Some((name, value)) => {
-                let equals = name.len();
-                let name = locate(name, 0..equals);
-                Some(Self { name, value: locate(value, equals + 1..argument.len()), report })
+                let equals_index = name.len();
+                let name = locate(name, 0..equals_index);
+                Some(Self { name, value: locate(value, equals_index + 1..argument.len()), report })
             }
             None => {
                 let title = format!("`{}` is not a constant", shorten(argument));

@@ -24,13 +24,13 @@ fn record_written_numbers<M: Model>(
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
-    let number_names = &parameter.parts;
+    let number_names = &parameter.number_names;
     if !written_numbers.record(name, number_names.clone(), report) {
         return false;
     }
     // The constant has an effect on a tolerance, as its nominal value.
     for constant in draft.constants.iter().filter(|_| !has_tolerance) {
-        if constant.parameter.parts.iter().all(|part| number_names.contains(part)) {
+        if constant.parameter.number_names.iter().all(|part| number_names.contains(part)) {
             let title = format!(
                 "`{}` is swept by an axis: this constant has no effect",
                 constant.name.value
@@ -45,11 +45,12 @@ fn record_written_numbers<M: Model>(
 
 /// Returns whether options fix all numbers of an axis, so that it sweeps nothing.
 fn is_fixed<M: Model>(swept_parameter: &ModelParameter<M>, draft: &Draft<'_, M>) -> bool {
-    let number_names = &swept_parameter.parts;
+    let number_names = &swept_parameter.number_names;
     let mut overriding_constants =
         draft.constants.iter().filter(|constant| constant.overrides_file);
-    overriding_constants
-        .any(|constant| number_names.iter().all(|part| constant.parameter.parts.contains(part)))
+    overriding_constants.any(|constant| {
+        number_names.iter().all(|part| constant.parameter.number_names.contains(part))
+    })
 }
 
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.

@@ -31,9 +31,9 @@ impl<M: Model> Plan<M> {
         let axes = self.axes.iter().map(|axis| self::axis_to_json(axis, self.design.as_ref()));
         let description = Keys::described(false, |keys| {
             sections::walk_plan_keys(&mut plan, keys);
-            keys.write("axis", axes.collect());
+            keys.write_value("axis", axes.collect());
             if !self.set.is_empty() {
-                keys.write("set", self.set.iter().cloned().collect());
+                keys.write_value("set", self.set.iter().cloned().collect());
             }
         });
         description.finish()

@@ -56,8 +56,8 @@ fn walk_list(design: &mut Option<Design>, keys: &mut Keys<'_>) {
     };
     let key = key.required("a CSV or Parquet file, relative to this file");
     let field = keys.walk_key(key, &Form::Text, &mut file);
-    keys.write("points", points.into());
-    keys.write("hash", hash.as_str().into());
+    keys.write_value("points", points.into());
+    keys.write_value("hash", hash.as_str().into());
     if field.into_located().is_some() || keys.section().is_none() {
         *design = Some(Design::List { file, points, hash });
     }
@@ -81,7 +81,7 @@ fn walk_spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_
         if let (None, Field::Present(_)) = (points_and_seed, field) {
             let title =
                 format!("`{name}` belongs to a design, and this grid has none that takes it");
-            keys.refuse(name, &title, "expected a grid file with [design]");
+            keys.refuse_option(name, &title, "expected a grid file with [design]");
         }
     }
     *design = Some(Design::Spread { rule, points, seed });

@@ -138,7 +138,7 @@ impl NumberArray {
 
 /// Returns the schema of a number in a range.
 pub fn number_schema(range: Range) -> Value {
-    let max_magnitude = Range::LARGEST;
+    let max_magnitude = Range::MAX_MAGNITUDE;
     match range {
         Range::Any => {
             json!({ "type": "number", "minimum": -max_magnitude, "maximum": max_magnitude })

@@ -102,7 +102,7 @@ pub struct Description {
 
 impl Description {
     /// Adds a key with its value or schema.
-    pub fn add(&mut self, key: Key<'_>, mut value: Value) {
+    pub fn add_key(&mut self, key: Key<'_>, mut value: Value) {
         if self.is_schema {
             if !key.description.is_empty() {
                 value["description"] = key.description.into();
@@ -181,12 +181,12 @@ impl<'a> Keys<'a> {
     pub fn describe(&mut self, key: Key<'_>, value: impl FnOnce(bool) -> Value) {
         if let KeyWalk::Describe(description) = &mut self.walk {
             let value = value(description.is_schema);
-            description.add(key, value);
+            description.add_key(key, value);
         }
     }
 
     /// Adds a value that is not in files, if the walk describes values.
-    pub fn write(&mut self, name: &'static str, value: Value) {
+    pub fn write_value(&mut self, name: &'static str, value: Value) {
         if !self.is_schema() {
             self.describe(Key::new(name, ""), |_| value);
         }
@@ -212,7 +212,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Rejects an option that has no place in the plan.
-    pub fn refuse(&self, name: &str, title: &str, expected: &str) {
+    pub fn refuse_option(&self, name: &str, title: &str, expected: &str) {
         let KeyWalk::Set(options) = &self.walk else { return };
         for written in options.arguments.iter().filter(|written| written.name.value == name) {
             options.report.refuse::<()>(&written.name.location, title, expected);
@@ -249,11 +249,11 @@ impl<'a> Keys<'a> {
                 if is_present && key.expected_value.is_none() {
                     schema["default"] = old_value;
                 }
-                description.add(key, schema);
+                description.add_key(key, schema);
                 Field::Absent
             }
             KeyWalk::Describe(description) if is_present => {
-                description.add(key, old_value);
+                description.add_key(key, old_value);
                 Field::Absent
             }
             KeyWalk::Set(_) | KeyWalk::Describe(_) => Field::Absent,
@@ -305,7 +305,7 @@ impl<'a> Keys<'a> {
             KeyWalk::Describe(description) => {
                 let inner_description = description.describe_inner(walk);
                 if inner_description != json!({}) {
-                    description.add(key, inner_description);
+                    description.add_key(key, inner_description);
                 }
                 Field::Absent
             }
@@ -317,19 +317,19 @@ impl<'a> Keys<'a> {
     pub fn walk_tables(
         &mut self,
         key: Key<'_>,
-        read: Vec<Section<'a>>,
+        sections: Vec<Section<'a>>,
         count: usize,
         mut walk: impl FnMut(&mut Keys<'a>, usize),
     ) {
-        for (k, section) in read.into_iter().enumerate() {
+        for (k, section) in sections.into_iter().enumerate() {
             let mut keys = Keys::new(KeyWalk::Read(section));
             walk(&mut keys, k);
             keys.finish();
         }
         let KeyWalk::Describe(description) = &mut self.walk else { return };
         let value = if description.is_schema {
-            let items = description.describe_inner(|keys| walk(keys, 0));
-            let mut schema = json!({ "type": "array", "items": items });
+            let item_schema = description.describe_inner(|keys| walk(keys, 0));
+            let mut schema = json!({ "type": "array", "items": item_schema });
             if key.expected_value.is_some() {
                 schema["minItems"] = 1.into();
             }
@@ -337,7 +337,7 @@ impl<'a> Keys<'a> {
         } else {
             (0..count).map(|k| description.describe_inner(|keys| walk(keys, k))).collect()
         };
-        description.add(key, value);
+        description.add_key(key, value);
     }
 
     /// Ends the walk, and rejects the keys of the file that the walk did not name.
@@ -354,7 +354,7 @@ impl<'a> Keys<'a> {
         &mut self,
         key: Key<'_>,
         variants: &KeyVariants,
-        current: Option<usize>,
+        current_index: Option<usize>,
         mut walk: impl FnMut(&mut Self, usize),
     ) -> Option<usize> {
         if let KeyWalk::Describe(table) = &mut self.walk
@@ -362,23 +362,24 @@ impl<'a> Keys<'a> {
         {
             for (k, (name, description)) in variants.words.iter().enumerate() {
                 let expected = (variants.default_index != Some(k)).then_some("");
-                let variant = table.describe_inner(|keys| {
+                let variant_schema = table.describe_inner(|keys| {
                     keys.describe(
                         Key { description, expected_value: expected, ..key },
                         |_| json!({ "const": name }),
                     );
                     walk(keys, k);
                 });
-                table.variant_schemas.push(variant);
+                table.variant_schemas.push(variant_schema);
             }
             return None;
         }
         let names: Vec<&str> = variants.words.iter().map(|(name, _)| *name).collect();
-        let choices = format_choices(&names);
-        let expected = key.expected_value.or(variants.default_index.is_none().then_some(&choices));
+        let choices_text = format_choices(&names);
+        let expected =
+            key.expected_value.or(variants.default_index.is_none().then_some(&choices_text));
         let allowed_count =
             if let KeyWalk::Set(_) = self.walk { variants.settable_count } else { names.len() };
-        let mut word = current.map(|current| names[current].to_owned());
+        let mut word = current_index.map(|current_index| names[current_index].to_owned());
         let field = self.walk_key(
             Key { expected_value: expected, ..key },
             &Form::Word(&names[..allowed_count]),
@@ -392,18 +393,18 @@ impl<'a> Keys<'a> {
             );
         }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
-        let selected = match (&self.walk, field) {
+        let selected_index = match (&self.walk, field) {
             (KeyWalk::Read(_), Field::Absent) => variants.default_index,
             (KeyWalk::Read(_), Field::Rejected) => None,
             _ => word,
         };
-        self.is_lenient = selected.is_none() && self.section().is_some();
-        match selected {
-            Some(selected) => walk(self, selected),
+        self.is_lenient = selected_index.is_none() && self.section().is_some();
+        match selected_index {
+            Some(selected_index) => walk(self, selected_index),
             None if self.is_lenient => (0..names.len()).for_each(|k| walk(self, k)),
             None => {}
         }
-        selected
+        selected_index
     }
 }
 

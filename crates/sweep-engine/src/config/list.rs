@@ -88,15 +88,17 @@ impl NumberTable {
         let mut list_columns = Vec::new();
         for (index, ((header, values), location)) in columns.into_iter().zip(locations).enumerate()
         {
-            let known_name = names.find(&header, None).unwrap_or_else(|[title, expected]| {
-                report.refuse::<()>(&location, title, expected);
-                None
-            });
+            let known_name =
+                names.find_known_name(&header, None).unwrap_or_else(|[title, expected]| {
+                    report.refuse::<()>(&location, title, expected);
+                    None
+                });
             let is_known = known_name.is_some();
             let (column_name, values) = match known_name {
                 Some(known_name) => {
-                    let values =
-                        values.into_iter().map(|column_name| known_name.scale.apply(column_name));
+                    let values = values
+                        .into_iter()
+                        .map(|column_name| known_name.unit_scale.apply(column_name));
                     (known_name.name, values.collect())
                 }
                 None => (header.clone(), Vec::new()),
@@ -130,7 +132,7 @@ impl NumberTable {
             RowLocations::Binary(location) => location.clone(),
             RowLocations::Lines { source, row_starts, separator } => {
                 let start = row_starts.get(row).map_or(0, |&start| start as usize);
-                let line = TextLine::at(sources.text(*source), start);
+                let line = TextLine::starting_at(sources.text(*source), start);
                 let span = line.cells(*separator).nth(column).map(|(_, location)| location);
                 Location::new(*source, span.unwrap_or(start..start))
             }

@@ -115,15 +115,17 @@ pub fn unknown_parameter<M: Model>(
 ) -> Diagnostic {
     let title = format!("unknown parameter {}", quote(name.value));
     let diagnostic = Diagnostic::new(title).at_location(&name.location, reason.as_str());
-    let tables = ["time", "integrator", "reliability"];
+    let table_names = ["time", "integrator", "reliability"];
     let table =
-        is_in_no_model.then(|| describe_keys::<M>().table_of(name.value, &tables)).flatten();
+        is_in_no_model.then(|| describe_keys::<M>().table_of(name.value, &table_names)).flatten();
     match (is_in_no_model, table) {
         (true, Some(table)) => {
-            let set = format!("`{}` is set in [{table}] of the grid file", name.value);
+            let set_text = format!("`{}` is set in [{table}] of the grid file", name.value);
             diagnostic.with_help(match name.value {
-                "window_s" => format!("{set}; `window_from_s` and `window_to_s` are its ends here"),
-                _ => format!("{set} and is the same at every point"),
+                "window_s" => {
+                    format!("{set_text}; `window_from_s` and `window_to_s` are its ends here")
+                }
+                _ => format!("{set_text} and is the same at every point"),
             })
         }
         (true, None) => {
@@ -142,9 +144,13 @@ pub fn unknown_parameter<M: Model>(
 fn write_constants<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
     let mut written_numbers = WrittenNumbers::default();
     for constant in constants {
-        if written_numbers.record(&constant.name, constant.parameter.parts.clone(), draft.report) {
+        if written_numbers.record(
+            &constant.name,
+            constant.parameter.number_names.clone(),
+            draft.report,
+        ) {
             draft.plan.write(&constant.parameter, constant.value.value);
-            for part in &constant.parameter.parts {
+            for part in &constant.parameter.number_names {
                 draft.report.record_location(part.clone(), constant.value.location.clone());
             }
             draft.constants.push(constant.clone());

@@ -69,7 +69,7 @@ fn find_locations<M: Model>(
     sources: &Sources,
 ) -> Vec<Location> {
     let writes_key = |parameter: &ModelParameter<M>| {
-        parameter.parts.iter().any(|part| keys.iter().any(|key| key == part))
+        parameter.number_names.iter().any(|part| keys.iter().any(|key| key == part))
     };
     let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| writes_key(&axis.parameter));
     let axes = axes.filter_map(|(k, _)| draft.report.location(&format!("axis[{k}]")));

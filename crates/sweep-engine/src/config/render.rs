@@ -19,25 +19,28 @@ const SHOWN_PART_BYTES: usize = 130;
 /// [`SHOWN_PART_BYTES`]. Doubling it leaves less room for the text after the mistake.
 const SHOWN_LEAD_BYTES: usize = 40;
 
-fn renderer(colour: bool) -> Renderer {
-    if colour { Renderer::styled() } else { Renderer::plain() }
+fn renderer(is_coloured: bool) -> Renderer {
+    if is_coloured { Renderer::styled() } else { Renderer::plain() }
 }
 
 /// Renders one mistake, without a newline at its end.
-fn render_diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
+fn render_diagnostic(diagnostic: &Diagnostic, sources: &Sources, is_coloured: bool) -> String {
     let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
     // Locations on one line share its snippet.
-    let mut shown: Vec<(usize, &Location)> = Vec::new();
+    let mut shown_locations: Vec<(usize, &Location)> = Vec::new();
     for (k, (location, _)) in diagnostic.locations.iter().enumerate() {
         let number = sources.line(location).number;
-        if shown.iter().any(|&(line, other)| line == number && other.source == location.source) {
+        if shown_locations
+            .iter()
+            .any(|&(line, other)| line == number && other.source == location.source)
+        {
             continue;
         }
-        shown.push((number, location));
+        shown_locations.push((number, location));
         group = add_snippet(group, diagnostic, sources, k);
     }
-    let help = diagnostic.help.iter().map(|help| Level::HELP.message(help.as_str()));
-    renderer(colour).render(&[group.elements(help)])
+    let help = diagnostic.help_texts.iter().map(|help| Level::HELP.message(help.as_str()));
+    renderer(is_coloured).render(&[group.elements(help)])
 }
 
 /// Adds the snippet of location `k`: its line, with every location on it marked.
@@ -53,15 +56,15 @@ fn add_snippet<'a>(
     let column = line.text[..line.span.start].chars().count() + 1;
     let mut snippet = Snippet::source(&line.text[window.clone()]).line_start(line.number);
     for (j, (other, label)) in diagnostic.locations.iter().enumerate() {
-        let marked = sources.line(other);
+        let marked_line = sources.line(other);
         let is_in_window = other.source == location.source
-            && marked.number == line.number
-            && window.start <= marked.span.start
-            && marked.span.start <= window.end;
+            && marked_line.number == line.number
+            && window.start <= marked_line.span.start
+            && marked_line.span.start <= window.end;
         if is_in_window {
             let kind = if j == 0 { AnnotationKind::Primary } else { AnnotationKind::Context };
-            let span =
-                marked.span.start - window.start..marked.span.end.min(window.end) - window.start;
+            let span = marked_line.span.start - window.start
+                ..marked_line.span.end.min(window.end) - window.start;
             snippet = snippet.annotation(kind.span(span).label(label.as_str()));
         }
     }
@@ -83,12 +86,12 @@ fn shown_window(line: &SourceLine<'_>) -> Range<usize> {
 }
 
 /// Returns the last line, which counts the mistakes.
-fn render_summary(count: usize, beyond: usize, colour: bool) -> String {
+fn render_summary(count: usize, beyond: usize, is_coloured: bool) -> String {
     let mistakes = format_count(count, "mistake");
     let shown_note =
         if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
     let title = format!("{mistakes}{shown_note}, nothing was done");
-    renderer(colour).render(&[Group::with_title(Level::ERROR.primary_title(title))])
+    renderer(is_coloured).render(&[Group::with_title(Level::ERROR.primary_title(title))])
 }
 
 impl Diagnostics {
@@ -97,13 +100,13 @@ impl Diagnostics {
         self.text(true)
     }
 
-    fn text(&self, colour: bool) -> String {
+    fn text(&self, is_coloured: bool) -> String {
         let mut text = String::new();
         for diagnostic in &self.shown {
-            text.push_str(&render_diagnostic(diagnostic, &self.sources, colour));
+            text.push_str(&render_diagnostic(diagnostic, &self.sources, is_coloured));
             text.push_str("\n\n");
         }
-        text.push_str(&render_summary(self.count(), self.omitted_count, colour));
+        text.push_str(&render_summary(self.count(), self.omitted_count, is_coloured));
         text
     }
 }

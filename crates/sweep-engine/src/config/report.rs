@@ -20,13 +20,13 @@ pub struct Diagnostic {
     /// mistake; the others explain the mistake.
     pub locations: Vec<(Location, String)>,
     /// The advice.
-    pub help: Vec<String>,
+    pub help_texts: Vec<String>,
 }
 
 impl Diagnostic {
     /// Returns a mistake without locations.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), locations: Vec::new(), help: Vec::new() }
+        Self { title: title.into(), locations: Vec::new(), help_texts: Vec::new() }
     }
 
     /// Returns the mistake of an expression at this location.
@@ -46,7 +46,7 @@ impl Diagnostic {
 
     /// Adds advice.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
-        self.help.push(help.into());
+        self.help_texts.push(help.into());
         self
     }
 
@@ -81,7 +81,7 @@ pub struct Report {
 #[derive(Debug, Default)]
 struct Mistakes {
     /// The mistakes that are shown.
-    shown: Vec<Diagnostic>,
+    kept_diagnostics: Vec<Diagnostic>,
     /// The number of further mistakes.
     omitted_count: usize,
     /// The lines that are not TOML. Other mistakes on them may come from the parser's recovery, so
@@ -92,11 +92,11 @@ struct Mistakes {
 }
 
 impl Mistakes {
-    fn add(&mut self, diagnostic: Diagnostic) {
-        if self.shown.len() >= MAX_MISTAKES {
+    fn add_mistake(&mut self, diagnostic: Diagnostic) {
+        if self.kept_diagnostics.len() >= MAX_MISTAKES {
             self.omitted_count += 1;
         } else {
-            self.shown.push(diagnostic);
+            self.kept_diagnostics.push(diagnostic);
         }
     }
 }
@@ -185,8 +185,8 @@ impl Report {
 
     /// Adds help to the last mistake that is shown, if there is one.
     pub fn add_help(&self, help: &str) {
-        if let Some(last) = self.mistakes.borrow_mut().shown.last_mut() {
-            last.help.push(help.to_owned());
+        if let Some(last) = self.mistakes.borrow_mut().kept_diagnostics.last_mut() {
+            last.help_texts.push(help.to_owned());
         }
     }
 
@@ -221,20 +221,20 @@ impl Report {
                 || lines.is_some_and(|lines| lines.contains(&sources.line(location).number))
         });
         if !is_on_malformed_line {
-            mistakes.add(diagnostic);
+            mistakes.add_mistake(diagnostic);
         }
     }
 
     /// Adds a mistake of syntax, the first of each line.
     pub fn push_syntax(&self, diagnostic: Diagnostic) {
         let mut mistakes = self.mistakes.borrow_mut();
-        let is_first_of_line = mistakes.shown.len() >= MAX_MISTAKES
+        let is_first_of_line = mistakes.kept_diagnostics.len() >= MAX_MISTAKES
             || diagnostic.locations.first().is_none_or(|(location, _)| {
                 let number = self.sources.borrow().line(location).number;
                 mistakes.malformed_lines.entry(location.source).or_default().insert(number)
             });
         if is_first_of_line {
-            mistakes.add(diagnostic);
+            mistakes.add_mistake(diagnostic);
         }
     }
 
@@ -251,18 +251,18 @@ impl Report {
             .iter()
             .any(|(location, _)| mistakes.malformed_lines.contains_key(&location.source))
         {
-            mistakes.add(diagnostic);
+            mistakes.add_mistake(diagnostic);
         }
     }
 
     /// Returns whether further mistakes are only counted.
     pub fn is_full(&self) -> bool {
-        self.mistakes.borrow().shown.len() >= MAX_MISTAKES
+        self.mistakes.borrow().kept_diagnostics.len() >= MAX_MISTAKES
     }
 
     /// Returns whether there are no mistakes so far.
     pub fn is_clean(&self) -> bool {
-        self.mistakes.borrow().shown.is_empty()
+        self.mistakes.borrow().kept_diagnostics.is_empty()
     }
 
     /// Returns the value if there is one and there are no mistakes.
@@ -272,7 +272,8 @@ impl Report {
 
     /// Returns all mistakes.
     pub fn into_diagnostics(self) -> Diagnostics {
-        let Mistakes { mut shown, omitted_count, .. } = self.mistakes.into_inner();
+        let Mistakes { kept_diagnostics: mut shown, omitted_count, .. } =
+            self.mistakes.into_inner();
         shown.sort_by_key(|diagnostic| {
             diagnostic.locations.first().map(|(location, _)| (location.source, location.span.start))
         });
@@ -301,7 +302,7 @@ impl Diagnostics {
 
     /// Returns the mistakes that are kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
-        let to_mistake = |Diagnostic { title, locations, help }: &Diagnostic| {
+        let to_mistake = |Diagnostic { title, locations, help_texts: help }: &Diagnostic| {
             let main_location = locations.first();
             let line = main_location.map(|(location, _)| self.sources.line(location));
             Mistake {

@@ -19,14 +19,14 @@ const SCHEMA_DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 pub fn grid_schema<M: Model>() -> Value {
     let mut description = describe_keys::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
-    description.add(key, M::schema_of_set());
+    description.add_key(key, M::schema_of_set());
     let axis_description = "headers of lists and measurements with the names of what they hold";
     let names = json!({ "type": "object", "additionalProperties": { "type": "string" } });
-    description.add(Key::new("columns", axis_description), names);
+    description.add_key(Key::new("columns", axis_description), names);
     let axes = json!({ "type": "array", "items": axis_schema() });
     let axis_description = "swept parameters; the first varies slowest. With [design] each has a \
                             range without a count";
-    description.add(Key::new("axis", axis_description), axes);
+    description.add_key(Key::new("axis", axis_description), axes);
     let mut schema = description.finish();
     // Only a design has distributions, and its ranges have no count.
     schema["if"] = json!({ "required": ["design"] });

@@ -132,9 +132,9 @@ impl<'a> Section<'a> {
     /// Rejects these keys with this reason instead of "unknown key".
     pub fn mark_misplaced(&self, keys: &[&'static str], reason: &str) {
         // The first reason of a key is kept, because it is the more specific one.
-        let mut misplaced = self.misplacement_reasons.borrow_mut();
+        let mut reasons = self.misplacement_reasons.borrow_mut();
         for key in keys {
-            misplaced.entry(key).or_insert_with(|| reason.to_owned());
+            reasons.entry(key).or_insert_with(|| reason.to_owned());
         }
     }
 
@@ -369,7 +369,7 @@ impl<'a> Section<'a> {
     /// Reports every key that was not read.
     pub fn finish(self) {
         let read_keys = self.read_keys.into_inner();
-        let misplaced = self.misplacement_reasons.into_inner();
+        let misplacement_reasons = self.misplacement_reasons.into_inner();
         for key in self.table.keys() {
             let name: &str = key.get_ref();
             if read_keys.contains(&name) {
@@ -377,7 +377,7 @@ impl<'a> Section<'a> {
             }
             self.report.push_with(|_| {
                 let location = Location::new(self.location.source, key.span());
-                match misplaced.get(name) {
+                match misplacement_reasons.get(name) {
                     Some(reason) => {
                         Diagnostic::new(format!("`{name}` does not belong in {}", self.title))
                             .at_location(&location, reason.as_str())
@@ -474,8 +474,8 @@ fn describe_array_entry(key: &str) -> String {
 }
 
 /// Shortens a user's text to fit a title.
-pub fn shorten(typed: &str) -> String {
-    truncate(typed, 60)
+pub fn shorten(typed_text: &str) -> String {
+    truncate(typed_text, 60)
 }
 
 /// Returns at most `max` characters of a text, with an ellipsis if it is shortened.

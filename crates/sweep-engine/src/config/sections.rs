@@ -195,11 +195,11 @@ const WINDOW_PARAMETERS: [&str; 2] = ["window_from_s", "window_to_s"];
 /// Returns the window that was read, if it is valid.
 fn check_window(
     location: &Location,
-    edges: &[f64],
+    window_edges: &[f64],
     end: Option<&Located<f64>>,
     report: &Report,
 ) -> Option<[f64; 2]> {
-    let &[from, to] = edges else { return None };
+    let &[from, to] = window_edges else { return None };
     let [from_text, to_text] = [from, to].map(decimal);
     if from >= to {
         let adjective = if from > to { "reversed" } else { "empty" };
@@ -254,7 +254,7 @@ fn walk_method(
                     &format!("only the {noun} \"{quoted_methods}\" {verb} it, not \"{name}\""),
                 );
                 let title = format!("the method \"{name}\" has no `{key}`");
-                keys.refuse(
+                keys.refuse_option(
                     key,
                     &title,
                     &format!("`{key}` belongs to \"{}\"", methods_with_key.join("\", \"")),

@@ -31,18 +31,18 @@ pub fn check_words<'t>(
     let mut are_all_valid = true;
     for found in found {
         let is_known = all.contains(&found.value);
-        let first = valid_words.iter().find(|other| other.value == found.value);
-        are_all_valid &= is_known && first.is_none();
-        match first {
+        let first_occurrence = valid_words.iter().find(|other| other.value == found.value);
+        are_all_valid &= is_known && first_occurrence.is_none();
+        match first_occurrence {
             _ if !is_known => report.push_with(|_| unknown_word_mistake(noun, &found, all)),
-            Some(first) => {
+            Some(first_occurrence) => {
                 let title = format!("the {noun} \"{}\" is given twice", found.value);
                 let refusal = Diagnostic::new(title)
                     .at_location(&found.location, format!("expected each {noun} once"));
                 // Names of one argument share a location.
-                report.push(match first.location == found.location {
+                report.push(match first_occurrence.location == found.location {
                     true => refusal,
-                    false => refusal.at_location(&first.location, "first given here"),
+                    false => refusal.at_location(&first_occurrence.location, "first given here"),
                 });
             }
             None => valid_words.push(found),

@@ -11,7 +11,7 @@ use crate::{Axis, GridInput, Model, Table};
 /// Returns the table of a study's candidates.
 pub fn candidates_table<M: Model>(study: &Study<M>, candidates: &[Candidate]) -> Table {
     let objective_count = study.objectives.len();
-    let front = find_pareto_front(candidates, objective_count);
+    let pareto_front = find_pareto_front(candidates, objective_count);
     let mut table = Table::new(M::ABOUT.build);
     table.add_counts("candidate", "index, in the order of trial", 0..candidates.len() as u64);
     table.add_counts(
@@ -49,14 +49,14 @@ pub fn candidates_table<M: Model>(study: &Study<M>, candidates: &[Candidate]) ->
     }
     let feasible_flags = candidates.iter().map(|candidate| candidate.is_feasible(objective_count));
     table.add_flags("feasible", "whether every condition holds", feasible_flags);
-    let front_flags = (0..candidates.len()).map(|k| front.contains(&k));
+    let front_flags = (0..candidates.len()).map(|k| pareto_front.contains(&k));
     table.add_flags(
         "on_front",
         "whether no feasible candidate beats it in every objective",
         front_flags,
     );
-    let mut optimum_json = study.settings();
-    optimum_json["best"] = find_best(candidates, &front, objective_count).into();
+    let mut optimum_json = study.settings_json();
+    optimum_json["best"] = find_best(candidates, &pareto_front, objective_count).into();
     let job = study.job();
     table.add_metadata(key::PLAN, &job.plan);
     table.add_text(key::PLAN_HASH, job.hash().to_hex().to_string());

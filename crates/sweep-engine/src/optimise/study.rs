@@ -197,12 +197,12 @@ impl<M: Model> Study<M> {
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::new(&self.plan);
         job.layout.kind = FileKind::Optimise;
-        job.plan["optimise"] = self.settings();
+        job.plan["optimise"] = self.settings_json();
         job
     }
 
     /// Returns the study's settings beside the plan, as JSON.
-    pub fn settings(&self) -> Value {
+    pub fn settings_json(&self) -> Value {
         let objective_json = |objective: &Objective| {
             let verb = if objective.sign > 0.0 { "minimise" } else { "maximise" };
             json!({ "name": objective.name, verb: objective.goal.text() })
@@ -286,10 +286,7 @@ fn read_parameters<M: Model>(
             continue;
         };
         let shares_number = |other_parameter: &ModelParameter<M>| {
-            other_parameter
-                .parts
-                .iter()
-                .any(|tolerance_field| parameter.parts.contains(tolerance_field))
+            other_parameter.number_names.iter().any(|name| parameter.number_names.contains(name))
         };
         let overriding_constant = draft
             .constants
@@ -346,9 +343,10 @@ fn read_objectives(
     }
     for section in sections {
         let location = section.location().clone();
-        let texts = OBJECTIVE_VERBS.map(|(verb, sign)| (section.text(verb).into_located(), sign));
+        let verb_texts =
+            OBJECTIVE_VERBS.map(|(verb, sign)| (section.text(verb).into_located(), sign));
         section.finish();
-        let [text] = &texts
+        let [text] = &verb_texts
             .into_iter()
             .filter_map(|(text, sign)| Some((text?, sign)))
             .collect::<Vec<_>>()[..]

@@ -13,9 +13,9 @@ pub struct PlanDifference {
     /// The JSON pointer to the value in the plan.
     pub pointer: String,
     /// The value in the older plan; `None` if it has none.
-    pub older: Option<String>,
+    pub older_value: Option<String>,
     /// The value in the present plan; `None` if it has none.
-    pub present: Option<String>,
+    pub present_value: Option<String>,
 }
 
 impl fmt::Display for PlanDifference {
@@ -26,8 +26,8 @@ impl fmt::Display for PlanDifference {
             f,
             "{}: was {}, is {}",
             self.pointer,
-            value_or_absent(&self.older),
-            value_or_absent(&self.present)
+            value_or_absent(&self.older_value),
+            value_or_absent(&self.present_value)
         )
     }
 }
@@ -48,8 +48,8 @@ pub(super) fn find_differences(older: &Value, present: &Value) -> Vec<PlanDiffer
             let pointer = path.iter().map(format_pointer_step).collect();
             differences.push(PlanDifference {
                 pointer,
-                older: older.map(format_value),
-                present: present.map(format_value),
+                older_value: older.map(format_value),
+                present_value: present.map(format_value),
             });
         }
     });
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn long_values_are_cut_on_a_character() {
         let older = json!({ "name": "ä".repeat(100) });
-        let formatted = find_differences(&older, &json!({}))[0].older.clone().unwrap();
+        let formatted = find_differences(&older, &json!({}))[0].older_value.clone().unwrap();
         assert!(formatted.ends_with("...") && formatted.chars().count() == 63, "{formatted}");
     }
 }

@@ -147,7 +147,7 @@ impl OpenRun {
         session: Option<Session>,
     ) -> Result<Vec<String>, StoreError> {
         let sidecar = provenance::sidecar_content(&self.folder, job, tally, session)?;
-        let path = self.folder.sidecar();
+        let path = self.folder.sidecar_path();
         files::check_replaceable(&path, self.folder.sidecar_kind())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();

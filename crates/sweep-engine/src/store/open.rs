@@ -454,8 +454,8 @@ fn find_column_difference(older: &Schema, present: &Schema) -> Option<PlanDiffer
     let pointer = "/columns".to_owned();
     (older != present).then(|| PlanDifference {
         pointer,
-        older: names_without(&older, &present),
-        present: names_without(&present, &older),
+        older_value: names_without(&older, &present),
+        present_value: names_without(&present, &older),
     })
 }
 

@@ -180,7 +180,7 @@ pub fn tally_rows(file: &ParquetFile) -> Result<Tally, StoreError> {
         return Err(content_error(file, format!("there is no column `{name}`")));
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
-    let over_estimate_limit = limits.map_or(0.0, RatioLimits::over_estimate);
+    let over_estimate_limit = limits.map_or(0.0, RatioLimits::over_estimate_limit);
     // Files of other programs may mark a column that has no worse side.
     let all_columns = columns(file.schema());
     let (marked_names, mut extremes): (Vec<&str>, Vec<ColumnExtreme>) = all_columns

@@ -74,7 +74,7 @@ impl Trials {
         trial_columns: TrialColumns,
         fresh: bool,
     ) -> Result<OpenOutcome<(), Self>, StoreError> {
-        let folder = Folder::beside(output, job.layout.kind)?;
+        let folder = Folder::next_to_output(output, job.layout.kind)?;
         let find_finished = || match job.layout.kind {
             // A file of the model's parameters does not record the search that made it.
             FileKind::ModelFile => Ok(None),

@@ -73,10 +73,9 @@ impl AssumedNumber {
         let Washer { machine, spin, .. } = &plan.model;
         let mut all = Vec::new();
         for parameter in MachineParameter::all(machine, spin) {
-            let is_swept = plan
-                .axes
-                .iter()
-                .any(|axis| axis.parameter.parts.iter().any(|part| part == parameter.name()));
+            let is_swept = plan.axes.iter().any(|axis| {
+                axis.parameter.number_names.iter().any(|part| part == parameter.name())
+            });
             let Some(assumption) = parameter.assumption() else { continue };
             if is_swept || !plan.sources.is_assumed(parameter.name()) {
                 continue;

@@ -56,9 +56,9 @@ fn parameters_page() -> String {
         if is_other_coordinate || is_further_part(name) {
             continue;
         }
-        let is_in_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
-        let missing_text = if is_in_grid { "as the grid file says" } else { "none" };
-        let has_source = value_of(name).is_some() || is_in_grid;
+        let is_from_grid_file = matches!(parameter.target(), Target::Spin | Target::Window(_));
+        let missing_text = if is_from_grid_file { "as the grid file says" } else { "none" };
+        let has_source = value_of(name).is_some() || is_from_grid_file;
         let source = match parameter.source() {
             _ if !has_source => String::new(),
             source if source.strip_prefix("derived: ") == Some(derivation) => "derived".to_owned(),

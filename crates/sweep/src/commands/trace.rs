@@ -115,7 +115,7 @@ fn choose_point(args: &TraceArgs) -> Result<Vec<String>, Error> {
     if let Some(column) = &args.worst {
         let worse;
         (point, worse) = find_worst(args, &plan, column)?;
-        tell(&format!("point {point} is where {column} is {}", worse.extreme()));
+        tell(&format!("point {point} is where {column} is {}", worse.worst_value_word()));
     }
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));

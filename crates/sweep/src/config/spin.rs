@@ -126,7 +126,7 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.mark_misplaced(&["file", "joints"], NEEDS_FILE_PROFILE);
     let Spin::Ramped { profile: spin_profile, peak_rpm, ramp_s } = spin else {
         let title = "the grid's spin is a table, which has no peak and no ramp";
-        keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
+        keys.refuse_option("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
         return;
     };
     let mut is_valid = true;

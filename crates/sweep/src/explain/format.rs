@@ -196,7 +196,7 @@ fn push_verdict(text: &mut String, map_result: &MapResult) {
     );
     push_line(text, "swept", words);
     if over_estimates(map_result) {
-        let limit_text = format_number(map_result.limits.over_estimate());
+        let limit_text = format_number(map_result.limits.over_estimate_limit());
         let words = format!("the linear model over-estimates: a ratio is below {limit_text}");
         push_line(text, "too high", words);
     }
@@ -213,7 +213,10 @@ fn push_verdict(text: &mut String, map_result: &MapResult) {
 
 /// Whether the linear model over-estimates a channel, by the limit that summaries of runs use.
 fn over_estimates(map_result: &MapResult) -> bool {
-    map_result.verdict.least.is_some_and(|(_, least)| least < map_result.limits.over_estimate())
+    map_result
+        .verdict
+        .least
+        .is_some_and(|(_, least)| least < map_result.limits.over_estimate_limit())
 }
 
 fn push_tongue(

@@ -8,7 +8,7 @@ use sweep_results::{Comparison, ResultTable};
 
 /// A kind of difference that makes the comparison fail.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum FailOn {
+pub(super) enum FailCriterion {
     Any,
     Plan,
     Rows,
@@ -22,7 +22,7 @@ pub(super) enum FailOn {
     Column(String, f64),
 }
 
-impl FromStr for FailOn {
+impl FromStr for FailCriterion {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -60,7 +60,7 @@ impl FromStr for FailOn {
     }
 }
 
-impl FailOn {
+impl FailCriterion {
     /// Returns the name of the check and the kind of files that it needs, if the compared files are
     /// of another kind. In such files the check would never fail.
     pub(super) fn find_unmet_need(
@@ -113,10 +113,12 @@ impl FailOn {
             Self::Column(name, max_change) => {
                 let column =
                     comparison.changed_columns.iter().find(|column| column.name == *name)?;
-                let worst =
-                    column.worst_rows.first().filter(|worst| worst.deviation() > *max_change)?;
+                let worst_row = column
+                    .worst_rows
+                    .first()
+                    .filter(|worst_row| worst_row.deviation() > *max_change)?;
                 let unit = column.unit.as_str();
-                let change_text = match worst.deviation() {
+                let change_text = match worst_row.deviation() {
                     deviation if deviation.is_finite() => {
                         format!("changed by up to {}", format_number(deviation))
                     }
@@ -170,10 +172,10 @@ mod tests {
 
     #[test]
     fn values_of_fail_on_are_parsed() {
-        assert_eq!("flips".parse(), Ok(FailOn::Flips));
-        assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
-        assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
-        let column = FailOn::Column("growth_per_s".to_owned(), 0.5);
+        assert_eq!("flips".parse(), Ok(FailCriterion::Flips));
+        assert_eq!("ratio=0.05".parse(), Ok(FailCriterion::Ratio(0.05)));
+        assert_eq!("boundary=2".parse(), Ok(FailCriterion::Boundary(2.0)));
+        let column = FailCriterion::Column("growth_per_s".to_owned(), 0.5);
         assert_eq!("growth_per_s = 0.5".parse(), Ok(column));
         for (text, expected_kind) in [
             ("flip", "expected any, plan"),
@@ -184,7 +186,7 @@ mod tests {
             ("=1", "expected any, plan"),
             ("ratio=nan", "at least 0"),
         ] {
-            let message = text.parse::<FailOn>().unwrap_err();
+            let message = text.parse::<FailCriterion>().unwrap_err();
             assert!(message.contains(expected_kind), "{text}: {message}");
         }
     }

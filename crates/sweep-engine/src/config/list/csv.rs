@@ -37,7 +37,7 @@ pub(super) fn read_text_table(
     names: &ColumnNames<'_>,
     report: &Report,
 ) -> Result<TextTable, ListError> {
-    let Some(layout) = TableLayout::find(text, names)? else {
+    let Some(layout) = TableLayout::detect(text, names)? else {
         return Ok(TextTable { separator: ',', ..TextTable::default() });
     };
     let separator = layout.separator;
@@ -128,7 +128,7 @@ pub(super) fn read_text_table(
 fn find_headers<'t>(
     layout: &TableLayout<'t>,
 ) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, ListError> {
-    let cells = layout.header.cells(layout.separator);
+    let cells = layout.header_line.cells(layout.separator);
     check_size(0, cells.clone().count())?;
     let mut headers: Vec<_> = cells.collect();
     while headers.len() > 1 && headers.last().is_some_and(|(name, _)| name.is_empty()) {
@@ -166,8 +166,8 @@ fn create_column(
     if header == ID_COLUMN {
         return (make_column(header.to_owned(), true), None);
     }
-    match names.find(header, unit) {
-        Ok(Some(found)) => (make_column(found.name, true), Some(found.scale)),
+    match names.find_known_name(header, unit) {
+        Ok(Some(found)) => (make_column(found.name, true), Some(found.unit_scale)),
         Ok(None) => (make_column(header.to_owned(), false), None),
         Err([title, expected]) => {
             report.refuse::<()>(&location, title, expected);
@@ -208,7 +208,7 @@ fn detect_notation<'t>(
     let has_comma_separator = table.separator == ',' && table.columns.len() > 1;
     let mut evidence = NotationEvidence::default();
     if has_comma_separator && !rows.clone().any(|line| line.text.contains('"')) {
-        return Ok(Notation::POINT);
+        return Ok(Notation::DECIMAL_POINT);
     }
     for line in rows {
         for ((cell, location), column) in line.cells(table.separator).zip(&table.columns) {

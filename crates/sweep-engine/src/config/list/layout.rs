@@ -37,7 +37,7 @@ pub(super) struct TextLine<'t> {
 
 impl<'t> TextLine<'t> {
     /// Returns the line that begins at a byte of a text.
-    pub(super) fn at(text: &'t str, start: usize) -> Self {
+    pub(super) fn starting_at(text: &'t str, start: usize) -> Self {
         let line = text.get(start..).unwrap_or_default();
         let line = line.split_inclusive('\n').next().unwrap_or_default();
         let line_body = line.trim_end_matches(['\n', '\r']);
@@ -62,7 +62,7 @@ pub(super) fn data_lines(text: &str, from: usize) -> impl Iterator<Item = TextLi
     let all_lines = text[from..].split_inclusive('\n').map(move |line| {
         let start = next_start;
         next_start += line.len();
-        TextLine::at(text, start)
+        TextLine::starting_at(text, start)
     });
     all_lines.filter(|line| {
         let line = line.text.trim();
@@ -128,7 +128,7 @@ pub(super) struct TableLayout<'t> {
     /// The separator of cells.
     pub(super) separator: char,
     /// The line of names.
-    pub(super) header: TextLine<'t>,
+    pub(super) header_line: TextLine<'t>,
     /// The units of the columns in order; shorter if some have none.
     pub(super) units: Vec<String>,
     /// The decimal mark that the file states.
@@ -147,7 +147,10 @@ impl<'t> TableLayout<'t> {
     ///
     /// # Errors
     /// A kind of LabVIEW file that is not supported.
-    pub(super) fn find(text: &'t str, names: &ColumnNames<'_>) -> Result<Option<Self>, ListError> {
+    pub(super) fn detect(
+        text: &'t str,
+        names: &ColumnNames<'_>,
+    ) -> Result<Option<Self>, ListError> {
         let mut first_lines: Vec<TextLine<'_>> =
             data_lines(text, 0).take(MAX_HEADER_SEARCH_LINES).collect();
         let Some(first_line) = first_lines.first().copied() else { return Ok(None) };
@@ -209,7 +212,7 @@ impl<'t> TableLayout<'t> {
             if units.is_some() { next_line.copied().unwrap_or(header) } else { header };
         Ok(Some(Self {
             separator,
-            header,
+            header_line: header,
             units: units.unwrap_or_default(),
             stated_notation: None,
             rows_start: end_of_line(text, last_header_line),
@@ -233,9 +236,9 @@ impl<'t> TableLayout<'t> {
         };
         let notation = match header_value("Decimal_Separator").as_deref() {
             // If commas separate cells, a comma at the end of the line is the value itself.
-            Some(",") => Notation::COMMA,
-            Some("") if separator == '\t' => Notation::COMMA,
-            _ => Notation::POINT,
+            Some(",") => Notation::DECIMAL_COMMA,
+            Some("") if separator == '\t' => Notation::DECIMAL_COMMA,
+            _ => Notation::DECIMAL_POINT,
         };
         let x_columns = header_value("X_Columns").unwrap_or_default();
         if x_columns != "One" && !x_columns.is_empty() {
@@ -268,7 +271,7 @@ impl<'t> TableLayout<'t> {
         units.extend(unit_labels.map(|(unit, _)| unit.to_owned()));
         Ok(Self {
             separator,
-            header,
+            header_line: header,
             units,
             stated_notation: Some(notation),
             rows_start,
@@ -287,7 +290,7 @@ fn find_commented_header<'t>(
 ) -> Option<TableLayout<'t>> {
     let preceding_text = text[..row.line_start].trim_end();
     let start = preceding_text.rfind('\n').map_or(0, |end| end + 1);
-    let line = TextLine::at(text, start);
+    let line = TextLine::starting_at(text, start);
     let name_text = line.text.trim_start().strip_prefix('#')?;
     let offset = line.text_start + line.text.len() - name_text.len();
     let header = TextLine { line_start: start, text: name_text, text_start: offset };
@@ -297,7 +300,7 @@ fn find_commented_header<'t>(
     let is_row = row_cells.len() == column_count && row_cells.into_iter().all(is_number);
     is_row.then_some(TableLayout {
         separator,
-        header,
+        header_line: header,
         units: Vec::new(),
         stated_notation: None,
         rows_start: row.line_start,
@@ -344,7 +347,7 @@ fn detect_separator(line: &str) -> char {
 /// Returns whether a cell is a number in any notation.
 fn is_number(cell: &str) -> bool {
     cell.contains(|letter: char| letter.is_ascii_digit())
-        && [Notation::POINT, Notation::COMMA]
+        && [Notation::DECIMAL_POINT, Notation::DECIMAL_COMMA]
             .into_iter()
             .any(|notation| notation.parse_number(cell).is_some())
 }

@@ -23,7 +23,7 @@ pub(super) struct KnownName {
     /// The name of the quantity.
     pub(super) name: String,
     /// The factor to the unit in the quantity's name.
-    pub(super) scale: UnitScale,
+    pub(super) unit_scale: UnitScale,
 }
 
 /// The mistake of a header with two units, or with a unit of another kind: title and expectation.
@@ -35,7 +35,7 @@ impl ColumnNames<'_> {
     ///
     /// # Errors
     /// A unit that contradicts the name.
-    pub(super) fn find(
+    pub(super) fn find_known_name(
         &self,
         header: &str,
         unit: Option<&str>,
@@ -66,7 +66,7 @@ impl ColumnNames<'_> {
             let has_unit_suffix = split_unit_suffix(&stem).is_some();
             return match (match_result, find_by_unit()) {
                 (Ok(match_result), _)
-                    if match_result.scale == UnitScale::ONE || !has_unit_suffix =>
+                    if match_result.unit_scale == UnitScale::IDENTITY || !has_unit_suffix =>
                 {
                     Ok(Some(match_result))
                 }
@@ -105,7 +105,7 @@ impl ColumnNames<'_> {
 
     /// Returns whether a header is that of a known column.
     pub(super) fn is_known_header(&self, header: &str) -> bool {
-        !matches!(self.find(header, None), Ok(None))
+        !matches!(self.find_known_name(header, None), Ok(None))
     }
 }
 
@@ -116,12 +116,12 @@ fn match_with_scale(
     unit: Option<&str>,
     unit_of_name: &str,
 ) -> Result<KnownName, UnitContradiction> {
-    let Some(unit) = unit else { return Ok(KnownName { name, scale: UnitScale::ONE }) };
+    let Some(unit) = unit else { return Ok(KnownName { name, unit_scale: UnitScale::IDENTITY }) };
     if unit == unit_of_name || unit_of_name == ANY_UNIT {
-        return Ok(KnownName { name, scale: UnitScale::ONE });
+        return Ok(KnownName { name, unit_scale: UnitScale::IDENTITY });
     }
     match find_unit_scale(unit, unit_of_name) {
-        Some(scale) => Ok(KnownName { name, scale }),
+        Some(scale) => Ok(KnownName { name, unit_scale: scale }),
         None => {
             let title = format!(
                 "the column `{}` is in `{}`, not in {unit_of_name}",
@@ -180,8 +180,8 @@ mod tests {
         };
         let renamed = [("Acc front".to_owned(), "arm_end_y_m_per_s2".to_owned())];
         let candidate_names = ColumnNames { find_quantity: &known, renamed_headers: &renamed };
-        let found = candidate_names.find(header, unit)?;
-        Ok(found.map(|found| (found.name, found.scale.apply(1.0))))
+        let found = candidate_names.find_known_name(header, unit)?;
+        Ok(found.map(|found| (found.name, found.unit_scale.apply(1.0))))
     }
 
     #[test]

@@ -60,14 +60,14 @@ pub(super) struct Notation {
 
 impl Notation {
     /// Decimal points.
-    pub(super) const POINT: Self = Self { decimal_mark: '.' };
+    pub(super) const DECIMAL_POINT: Self = Self { decimal_mark: '.' };
 
     /// Decimal commas.
-    pub(super) const COMMA: Self = Self { decimal_mark: ',' };
+    pub(super) const DECIMAL_COMMA: Self = Self { decimal_mark: ',' };
 
     /// Parses the number in a cell.
     pub(super) fn parse_number(self, cell: &str) -> Option<f64> {
-        if self == Self::POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
+        if self == Self::DECIMAL_POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
             return cell.parse().ok();
         }
         let cell = remove_group_marks(cell);
@@ -111,11 +111,11 @@ impl NotationEvidence {
         let comma_evidence = decimal_comma.or(thousands_point);
         match (point_evidence, comma_evidence) {
             (Some(point), Some(comma)) => Err(UnclearNotation::TwoNotations(point, comma)),
-            (Some(_), None) => Ok(Notation::POINT),
-            (None, Some(_)) => Ok(Notation::COMMA),
+            (Some(_), None) => Ok(Notation::DECIMAL_POINT),
+            (None, Some(_)) => Ok(Notation::DECIMAL_COMMA),
             (None, None) => match (either_point, either_comma) {
-                (None, None) => Ok(Notation::POINT),
-                (Some(_), None) if has_commas => Ok(Notation::POINT),
+                (None, None) => Ok(Notation::DECIMAL_POINT),
+                (Some(_), None) if has_commas => Ok(Notation::DECIMAL_POINT),
                 (Some(one), _) | (None, Some(one)) => Err(UnclearNotation::OneCell(one)),
             },
         }

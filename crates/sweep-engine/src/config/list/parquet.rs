@@ -56,14 +56,14 @@ fn read_columns_unguarded(
     let mut known_columns: Vec<(usize, usize, UnitScale)> = Vec::new();
     for (column_index, field) in fields.iter().enumerate() {
         let header = field.name().clone();
-        let known_name = names.find(&header, None);
+        let known_name = names.find_known_name(&header, None);
         match known_name.map_err(|[title, expected]| format!("{title}: {expected}"))? {
-            Some(KnownName { name, scale }) => {
+            Some(KnownName { name, unit_scale: scale }) => {
                 let is_clock = name == TIME_COLUMN && cells::is_clock(field.data_type());
                 if !cells::is_number(field.data_type()) && !is_clock {
                     return Err(no_numbers_error(&header, field.data_type()));
                 }
-                let scale = if is_clock { UnitScale::ONE } else { scale };
+                let scale = if is_clock { UnitScale::IDENTITY } else { scale };
                 known_columns.push((columns.len(), column_index, scale));
                 columns.push(ParquetColumn { name, header, values: Some(Vec::new()), is_clock });
             }

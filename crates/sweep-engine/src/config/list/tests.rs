@@ -147,7 +147,7 @@ fn a_damaged_file_gives_an_error_or_a_list() {
 
 /// Returns the position of a cell in the line that begins at a byte of a text.
 fn cell_span(text: &str, start: usize, separator: char, column: usize) -> std::ops::Range<usize> {
-    TextLine::at(text, start).cells(separator).nth(column).expect("it is there").1
+    TextLine::starting_at(text, start).cells(separator).nth(column).expect("it is there").1
 }
 
 fn read_csv(text: &str) -> Result<csv::TextTable, ListError> {
@@ -258,8 +258,8 @@ fn read_logger_file(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
         let known_quantity = KNOWN_QUANTITIES.iter().find(|(known, _)| *known == name);
         known_quantity.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
     };
-    let renamed = [("Acc front".to_owned(), "acc_m_per_s2".to_owned())];
-    let column_names = ColumnNames { find_quantity: &known, renamed_headers: &renamed };
+    let renamed_headers = [("Acc front".to_owned(), "acc_m_per_s2".to_owned())];
+    let column_names = ColumnNames { find_quantity: &known, renamed_headers: &renamed_headers };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("logger.csv");
     std::fs::write(&path, bytes).unwrap();

@@ -9,7 +9,7 @@ pub(super) struct UnitScale {
 
 impl UnitScale {
     /// The factor between equal units.
-    pub(super) const ONE: Self = Self { numerator: 1.0, denominator: 1.0 };
+    pub(super) const IDENTITY: Self = Self { numerator: 1.0, denominator: 1.0 };
 
     /// Converts a number to the other unit.
     pub(super) fn apply(self, value: f64) -> f64 {
@@ -128,7 +128,7 @@ pub(super) fn find_unit_scale(from: &str, to: &str) -> Option<UnitScale> {
     let mut unit_pairs = find_units(from).flat_map(|from| find_units(to).map(move |to| (from, to)));
     let (from, to) = unit_pairs.find(|(from, to)| from.base_unit == to.base_unit)?;
     if from.base_scale == to.base_scale {
-        return Some(UnitScale::ONE);
+        return Some(UnitScale::IDENTITY);
     }
     Some(UnitScale {
         numerator: from.base_scale.numerator * to.base_scale.denominator,
