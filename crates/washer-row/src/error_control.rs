@@ -125,16 +125,6 @@ pub(crate) fn contraction(kind: MethodKind, start: FamilyStart) -> f64 {
     }
 }
 
-/// Returns the share of the difference of two levels that counts as the finer level's own: all of
-/// it, unless another method begins. That method is more accurate, so that the difference is mostly
-/// the error of the level before, and the level's own share is that of a further tolerance.
-pub(crate) fn own_share(start: FamilyStart) -> f64 {
-    match start {
-        FamilyStart::Method => TOLERANCE_RATIO,
-        FamilyStart::None | FamilyStart::Modes => 1.0,
-    }
-}
-
 /// Returns the relative difference of two levels from that of their numbers and the separation of
 /// their motions.
 pub(crate) fn difference_of_levels(numbers: f64, separation: Separation) -> f64 {

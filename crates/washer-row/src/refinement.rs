@@ -3,9 +3,7 @@
 
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{
-    amplification, contraction, difference_of_levels, error_of_level, own_share,
-};
+use crate::error_control::{amplification, contraction, difference_of_levels, error_of_level};
 use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
@@ -54,10 +52,10 @@ struct ModelRule<'a> {
 
 impl ModelRule<'_> {
     /// Returns the greatest ratio of unresolved ringing to a row's number: the vibration of
-    /// bearings and hinge that a level's steps do not resolve, relative to the amplitudes and to
-    /// the clearance, times the amplification of the motion. Ringing about a standstill counts only
-    /// if it exceeds the least amplitude of a moving machine, below which the verdict knows no
-    /// motion.
+    /// bearings and hinge that a level's steps do not resolve, relative to the amplitudes, to the
+    /// clearance and, where the hinge rings, to the speeds of dampers, times the amplification of
+    /// the motion. Ringing about a standstill counts only if it exceeds the least amplitude of a
+    /// moving machine, below which the verdict knows no motion.
     fn relative_ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
         let Some(run) = &refinement.run else { return 0.0 };
         let Some(unresolved) = self.levels.unresolved_modes(level) else { return 0.0 };
@@ -72,10 +70,25 @@ impl ModelRule<'_> {
         }
         match unresolved {
             UnresolvedModes::HingeAndBearings => {
-                amplification(refinement.first_difference, self.rule.accuracy) * greatest_ringing
+                let speeds = self.relative_speed_ringing(amplitude_bounds.tub_speed_m_per_s, run);
+                amplification(refinement.first_difference, self.rule.accuracy)
+                    * greatest_ringing.max(speeds)
             }
             UnresolvedModes::Bearings => greatest_ringing,
         }
+    }
+
+    /// Returns the greatest ratio of a speed by unresolved ringing (m/s) to the speed of a damper.
+    fn relative_speed_ringing(&self, ringing_m_per_s: f64, run: &LevelRun) -> f64 {
+        let columns = self.rule.measures.model_columns();
+        let speeds = run.trajectory.metrics.iter().zip(columns);
+        speeds
+            .filter(|(_, column)| column.metric == Metric::DamperSpeed)
+            .map(|(speed_m_per_s, column)| {
+                let least = column.metric.scale(self.rule.window_s, self.point.weight_n());
+                ringing_m_per_s / speed_m_per_s.max(least)
+            })
+            .fold(0.0, f64::max)
     }
 }
 
@@ -189,7 +202,7 @@ impl ModelRefinement {
         };
         let last = self.differences.last()?;
         let error = error_of_level(last.relative()?, contracted_difference)?;
-        Some((own_share(last.start) * error).max(rule.relative_ringing(self.level, self)))
+        Some(error.max(rule.relative_ringing(self.level, self)))
     }
 
     /// Returns the level to run next if the error is above the accuracy or the verdict

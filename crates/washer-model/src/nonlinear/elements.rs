@@ -98,8 +98,10 @@ impl<T: Lane> Elements<T> {
     pub(crate) fn load_on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
-        add_forces(&mut load, &self.springs, tub, false);
-        add_forces(&mut load, &self.dampers, tub, false);
+        add_forces(&mut load, &self.springs, tub, ForcePart::Linear);
+        if !self.has_friction.is_set() {
+            add_forces(&mut load, &self.dampers, tub, ForcePart::Linear);
+        }
         if self.has_optional_forces.is_set() {
             // The copy lets `load` stay in registers if there are no optional forces.
             let mut load_copy = load;
@@ -136,8 +138,8 @@ impl<T: Lane> Elements<T> {
     #[inline(always)]
     pub(crate) fn stop_depth_and_force(&self, index: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[index];
-        let point = tub.point_motion(&stop.tub_point);
-        [stop.depth(&point), stop.force(&point)]
+        let StopMotion { depth, speed, .. } = stop.motion(tub);
+        [depth, stop.force_at_depth(depth, speed)]
     }
 
     /// Computes the length of a damper (m) and the speed along it (m/s).
@@ -151,8 +153,9 @@ impl<T: Lane> Elements<T> {
     }
 }
 
-/// The evaluation of optional forces. A machine without such forces adds zeros, so that its results
-/// do not depend on the machines in other lanes.
+/// The evaluation of optional forces, and of all forces of dampers if one has friction. A machine
+/// without optional forces adds zeros, so that its results do not depend on the machines in other
+/// lanes.
 struct OptionalForces<'a, T> {
     elements: &'a Elements<T>,
     tub: &'a TubMotion<T>,
@@ -165,16 +168,16 @@ impl<T: Lane> OutOfLine for OptionalForces<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;
-        if elements.has_cubic_springs.is_set() {
-            add_forces(load, &elements.springs, tub, true);
-        }
         if elements.has_friction.is_set() {
-            add_forces(load, &elements.dampers, tub, true);
+            add_forces(load, &elements.dampers, tub, ForcePart::All);
+        }
+        if elements.has_cubic_springs.is_set() {
+            add_forces(load, &elements.springs, tub, ForcePart::Optional);
         }
         for stop in &elements.stops {
-            let point = tub.point_motion(&stop.tub_point);
-            let force = scale(-stop.force(&point), stop.direction);
-            add_force(load, &stop.tub_point, &tub.tilt.rotate_to_frame(&force));
+            let StopMotion { direction, depth, speed } = stop.motion(tub);
+            let force = scale(-stop.force_at_depth(depth, speed), direction);
+            add_force(load, &stop.tub_point, &force);
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point_motion(&bushing.tub_point));
@@ -360,6 +363,22 @@ impl<T: Real> StopCoefficients<T> {
         self.force_at_depth(self.depth(point), self.speed(point))
     }
 
+    /// Computes the motion of the tub point along the stop's direction. In tub axes the tub point is
+    /// fixed, so that only the direction is rotated.
+    #[inline(always)]
+    fn motion(&self, tub: &TubMotion<T>) -> StopMotion<T> {
+        let direction = tub.tilt.rotate_to_frame(&self.direction);
+        let [y, z] = tub.midpoint;
+        let displacement = dot(&self.tub_point, &direction) - dot(&self.tub_point, &self.direction)
+            + (y * self.direction[1] + z * self.direction[2]);
+        let velocity = add_cross_product(&tub.velocity, &tub.angular_velocity, &self.tub_point);
+        StopMotion {
+            direction,
+            depth: displacement - self.clearance,
+            speed: dot(&velocity, &direction),
+        }
+    }
+
     /// Returns the tub point's speed along the stop's direction (m/s).
     #[inline(always)]
     fn speed(&self, point: &PointMotion<T>) -> N<T> {
@@ -373,6 +392,16 @@ impl<T: Real> StopCoefficients<T> {
         let contact_share = (0.5 * (1.0 + depth / w)).v();
         (contact_share * (self.stiffness * w + self.damping * speed)).v()
     }
+}
+
+/// The motion of a stop's tub point along the stop's direction.
+struct StopMotion<T> {
+    /// The direction, in tub axes.
+    direction: Vec3<T>,
+    /// The depth beyond the clearance (m), negative while the stop is open.
+    depth: N<T>,
+    /// The speed (m/s).
+    speed: N<T>,
 }
 
 lane_struct! {
@@ -644,14 +673,21 @@ impl<T: Real> ElementLine<T> for CabinetLine<T> {
     }
 }
 
-/// Adds the forces of elements and their moments: the optional forces if `is_optional`, else the
-/// linear ones.
+/// The part of the force of an element.
+#[derive(Clone, Copy)]
+enum ForcePart {
+    Linear,
+    Optional,
+    All,
+}
+
+/// Adds a part of the forces of elements, and its moments.
 #[inline(always)]
 fn add_forces<T: Real, E: ForceLaw<T>>(
     load: &mut (Vec3<T>, Vec3<T>),
     elements: &[E],
     tub: &TubMotion<T>,
-    is_optional: bool,
+    part: ForcePart,
 ) {
     for element in elements {
         let ends = element.ends();
@@ -660,7 +696,11 @@ fn add_forces<T: Real, E: ForceLaw<T>>(
             tub_end: &ends.tub_end,
             tub,
         };
-        let force = if is_optional { element.optional_force(&line) } else { element.force(&line) };
+        let force = match part {
+            ForcePart::Linear => element.force(&line),
+            ForcePart::Optional => element.optional_force(&line),
+            ForcePart::All => element.force(&line) + element.optional_force(&line),
+        };
         add_force(load, &ends.tub_end, &scale(force, line.span));
     }
 }

@@ -53,6 +53,8 @@ struct FrontDeflection {
     drum_front_m: f64,
     tub_front_m: f64,
     tub_angle_rad: f64,
+    /// The speed of the tub's front in the free vibration that begins with this deflection.
+    tub_front_m_per_s: f64,
 }
 
 impl FrontDeflection {
@@ -62,6 +64,7 @@ impl FrontDeflection {
             drum_front_m: self.drum_front_m.max(other.drum_front_m),
             tub_front_m: self.tub_front_m.max(other.tub_front_m),
             tub_angle_rad: self.tub_angle_rad.max(other.tub_angle_rad),
+            tub_front_m_per_s: self.tub_front_m_per_s.max(other.tub_front_m_per_s),
         }
     }
 }
@@ -168,6 +171,8 @@ pub struct Swing {
     pub channels: [f64; CHANNELS],
     /// The swing of the gap between drum and tub in the whole run (m).
     pub gap_m: f64,
+    /// The speed of the tub's front by its swing in the window (m/s).
+    pub tub_speed_m_per_s: f64,
 }
 
 impl Ringing {
@@ -240,7 +245,8 @@ impl Ringing {
                 }
         });
         let gap_m = run_factor * (deflection.drum_front_m + deflection.tub_front_m);
-        Swing { channels, gap_m }
+        let tub_speed_m_per_s = window_factor * deflection.tub_front_m_per_s;
+        Swing { channels, gap_m, tub_speed_m_per_s }
     }
 }
 
@@ -318,10 +324,30 @@ impl<'a> UnsuspendedMachine<'a> {
         let drum_front_m = bearings_m
             + drum.front_x_m.abs() * bearings_rad
             + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;
+        let tub_front_m = tub_m + machine.tub.front_x_m.abs() * tub_angle_rad;
         FrontDeflection {
             drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_angle_rad,
-            tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_angle_rad,
+            tub_front_m,
             tub_angle_rad,
+            tub_front_m_per_s: self.frequency_rad_per_s(elastic_deflection) * tub_front_m,
         }
+    }
+
+    /// Returns the frequency of the free vibration with the shape of an elastic deflection, by
+    /// Rayleigh's quotient.
+    fn frequency_rad_per_s(&self, elastic_deflection: &[f64; COORDINATES]) -> f64 {
+        let rigid_motion = self.rigid_motion(&self.multiply_mass(elastic_deflection));
+        let shape: [f64; COORDINATES] =
+            core::array::from_fn(|i| elastic_deflection[i] - rigid_motion[i]);
+        let momentum = self.multiply_mass(&shape);
+        let modal_mass: f64 = shape.iter().zip(&momentum).map(|(x, p)| x * p).sum();
+        let modal_stiffness: f64 = ELASTIC_COORDINATES
+            .iter()
+            .flat_map(|&i| ELASTIC_COORDINATES.map(|j| [i, j]))
+            .map(|[i, j]| {
+                elastic_deflection[i] * self.matrices.stiffness[i][j] * elastic_deflection[j]
+            })
+            .sum();
+        if modal_mass > 0.0 { (modal_stiffness / modal_mass).sqrt() } else { 0.0 }
     }
 }

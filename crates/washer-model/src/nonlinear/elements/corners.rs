@@ -1,7 +1,7 @@
 //! Computes each force with a corner as a function of a single motion: the friction of a damper as
 //! a function of its length and speed, and the force of a stop as a function of depth and speed.
 
-use super::{CabinetLine, Elements, ForceLaw as _, TubMotion};
+use super::{CabinetLine, Elements, ForceLaw as _, StopMotion, TubMotion};
 use crate::lanes::{ToDual as _, lane_struct};
 use lane_ode::{Lane, N};
 
@@ -22,8 +22,8 @@ impl<T: Lane> Elements<T> {
             motions.push(self.damper_motion(number, tub));
         }
         for stop in &self.stops {
-            let point = tub.point_motion(&stop.tub_point);
-            motions.push([stop.depth(&point), stop.speed(&point)]);
+            let StopMotion { depth, speed, .. } = stop.motion(tub);
+            motions.push([depth, speed]);
         }
         motions
     }
