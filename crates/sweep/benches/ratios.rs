@@ -283,7 +283,7 @@ fn motions(rounds: usize) {
     };
     let dwell = prepare_points(1.0);
     let dwells = [HeldSpeed { point: &dwell[0], speed_rpm: SPEED_RPM }];
-    let starts = StartRule { count: TRAJECTORIES, max_time_s: 100.0, ..StartRule::default() };
+    let starts = StartRule { start_count: TRAJECTORIES, max_time_s: 100.0, ..StartRule::default() };
     let find = || find_attractors(Simd::widest(), &dwells, &[], &starts, Cancel::Never).remove(0);
     // The time is a whole number of windows.
     let followed_s = find().map(|found| found.attractors[0].time_s).expect("it has motions");

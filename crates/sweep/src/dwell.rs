@@ -93,7 +93,7 @@ impl fmt::Display for AttractorSearch {
         if let Some(carry) = self.carry {
             write!(f, " --carry {}", carry.name())?;
         }
-        if self.starts != defaults.count as u64 {
+        if self.starts != defaults.start_count as u64 {
             write!(f, " --starts {}", self.starts)?;
         }
         if self.kick != defaults.max_kick_rad_per_s {
@@ -178,7 +178,7 @@ impl AttractorEngine {
         gauges[Gauge::ClashTime as usize] = false;
         let recorders = Recorders { gauges, ..Recorders::default() };
         let starts = StartRule {
-            count: if search.carry.is_some() { 1 } else { search.starts as usize },
+            start_count: if search.carry.is_some() { 1 } else { search.starts as usize },
             max_kick_rad_per_s: search.kick,
             max_time_s: search.longest,
             finds_threshold: search.threshold,

@@ -251,7 +251,7 @@ fn memory_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
 /// that are in progress.
 fn turn_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
     let plan = engine.plan();
-    if !plan.model.measures.recorders().turns {
+    if !plan.model.measures.recorders().with_turns {
         return 0.0;
     }
     let turns = plan.model.spin.turns_within(plan.window_s);

@@ -339,11 +339,11 @@ mod tests {
                 let mut jacobian = [[0.0_f64; STATE_LEN]; STATE_LEN];
                 washer_jacobian(20.0, x.as_ptr(), jacobian.as_mut_ptr().cast(), machine);
                 for j in 0..STATE_LEN {
-                    let step = 1e-5;
+                    let difference_step = 1e-5;
                     let mut shifted_rates = [[0.0; STATE_LEN]; 2];
                     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                         let mut shifted_state = x;
-                        shifted_state[j] += sign * step;
+                        shifted_state[j] += sign * difference_step;
                         washer_rhs(
                             20.0,
                             shifted_state.as_ptr(),
@@ -356,7 +356,7 @@ mod tests {
                     });
                     for i in 0..STATE_LEN {
                         let difference_quotient =
-                            (shifted_rates[0][i] - shifted_rates[1][i]) / (2.0 * step);
+                            (shifted_rates[0][i] - shifted_rates[1][i]) / (2.0 * difference_step);
                         let error = (jacobian[i][j] - difference_quotient).abs() / column_scale;
                         assert!(
                             error < 1e-6,

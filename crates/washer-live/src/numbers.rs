@@ -41,7 +41,7 @@ impl NumberWalk<'_> {
         Some(())
     }
 
-    /// Writes `count` and returns it, or reads another count and returns the latter.
+    /// Writes `count` and returns it, or reads and returns another count.
     pub(crate) fn walk_count(&mut self, count: usize) -> Option<usize> {
         let mut value = count as f64;
         self.walk_numbers([&mut value])?;

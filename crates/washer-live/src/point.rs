@@ -175,8 +175,11 @@ pub fn check_point(setup: &Setup, values: &[f64]) -> Result<Answer, PointError> 
             let model_levels = &levels[model];
             let perturbed = model_levels.is_perturbed(level_index).then(|| point.perturbed());
             let start_point = perturbed.as_ref().unwrap_or(&point);
-            let run = run_method(model, model_levels.method(level_index), &[start_point], rule);
-            runs.extend(run.into_iter().map(|run| ((model, level_index), run)));
+            let level_runs =
+                run_method(model, model_levels.method(level_index), &[start_point], rule);
+            runs.extend(
+                level_runs.into_iter().map(|level_runs| ((model, level_index), level_runs)),
+            );
         }
     };
     let finest_runs = [0, 1].map(|model| refinement.finest_run(model, &point, refinement_rule));
@@ -249,8 +252,8 @@ pub fn find_disturbances(
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
     let disturbance =
         |first_response: &Response| (first_response.disturbance(), first_response.is_on_curve);
-    let answers = find_responses(&held_speeds, Cancel::Never).into_iter();
-    Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
+    let results_by_speed = find_responses(&held_speeds, Cancel::Never).into_iter();
+    Ok(results_by_speed.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
 /// Returns the largest attractor of a point over some constant speeds (rpm), from the default

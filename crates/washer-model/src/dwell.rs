@@ -52,7 +52,7 @@ const THRESHOLD_BISECTIONS: usize = 5;
 pub struct StartRule {
     /// The number of starts; each perturbed response is a start even if there are more responses
     /// than this.
-    pub count: usize,
+    pub start_count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
     pub max_kick_rad_per_s: f64,
     /// The maximum time of a trajectory (s).
@@ -66,7 +66,7 @@ pub struct StartRule {
 impl Default for StartRule {
     fn default() -> Self {
         Self {
-            count: 12,
+            start_count: 12,
             max_kick_rad_per_s: 6.0,
             max_time_s: 600.0,
             finds_threshold: false,
@@ -405,7 +405,7 @@ impl<'a> SpeedSearch<'a> {
         let rest_state = <NonlinearModel<f64> as LaneModel<f64>>::rest_state(point);
         let kicked_state = responses.first().map_or(rest_state, |response| response.start_state);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
-        let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.count));
+        let directions = kick_directions(point, &frozen_modes, random_kick_count(rule.start_count));
         if let Some(carried_state) = carried_state {
             states.push((perturb(point, &frozen_modes, &carried_state), Origin::Carried));
         } else {
@@ -415,7 +415,7 @@ impl<'a> SpeedSearch<'a> {
             let to_perturbed_start =
                 |start| (perturb(point, &frozen_modes, start), Origin::Response);
             states.extend(response_states.iter().map(to_perturbed_start));
-            let count = rule.count.saturating_sub(states.len());
+            let count = rule.start_count.saturating_sub(states.len());
             for kick in plan_kicks(count, rule.max_kick_rad_per_s) {
                 let (state, origin) = match is_from_rest(kick) {
                     true => (&rest_state, Origin::Rest),

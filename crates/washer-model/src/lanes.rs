@@ -116,17 +116,17 @@ impl<A: ToDual> ToDual for Vec<A> {
     }
 }
 
-/// A boolean property of machines that is true if any machine that was written to a lane has it.
+/// A flag over lanes that is set if it is set for the machine in any lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AnyLaneFlag<T>(bool, PhantomData<T>);
 
 impl<T> AnyLaneFlag<T> {
-    /// Creates the property for one machine.
+    /// Creates the flag of one machine.
     pub(crate) fn new(is_set: bool) -> Self {
         Self(is_set, PhantomData)
     }
 
-    /// Returns whether any machine has the property.
+    /// Returns whether the flag is set for any machine.
     #[inline(always)]
     pub(crate) fn is_set(self) -> bool {
         self.0

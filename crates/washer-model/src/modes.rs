@@ -89,8 +89,8 @@ pub(crate) fn modal_assurance(
     a: &[[f64; 2]; COORDINATES],
     b: &[[f64; 2]; COORDINATES],
 ) -> f64 {
-    let product = mass_inner_product(mass, a, b);
-    product[0] * product[0] + product[1] * product[1]
+    let inner_product = mass_inner_product(mass, a, b);
+    inner_product[0] * inner_product[0] + inner_product[1] * inner_product[1]
 }
 
 /// Returns a^H M b as real and imaginary part.
@@ -99,15 +99,15 @@ pub(crate) fn mass_inner_product(
     a: &[[f64; 2]; COORDINATES],
     b: &[[f64; 2]; COORDINATES],
 ) -> [f64; 2] {
-    let mut sum = [0.0; 2];
+    let mut inner_product = [0.0; 2];
     for i in 0..COORDINATES {
         for j in 0..COORDINATES {
             let m = mass[i][j];
-            sum[0] += m * (a[i][0] * b[j][0] + a[i][1] * b[j][1]);
-            sum[1] += m * (a[i][0] * b[j][1] - a[i][1] * b[j][0]);
+            inner_product[0] += m * (a[i][0] * b[j][0] + a[i][1] * b[j][1]);
+            inner_product[1] += m * (a[i][0] * b[j][1] - a[i][1] * b[j][0]);
         }
     }
-    sum
+    inner_product
 }
 
 /// Computes the modes at a frozen angle and a spin speed.

@@ -300,7 +300,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         let SimulationRequest { points, method, recorders, cancel } = request;
         let substeps = Substeps::for_method(method);
         let with_capacity_for = |point: &&Point| Vec::with_capacity(point.segments.len());
-        let checkpoints = match recorders.checkpoints {
+        let checkpoints = match recorders.with_checkpoints {
             true => points.iter().map(with_capacity_for).collect(),
             false => Vec::new(),
         };

@@ -201,8 +201,8 @@ impl Measures {
     /// Returns the recorders that the measures need.
     pub fn recorders(&self) -> Recorders {
         Recorders {
-            root_mean_squares: self.criterion == Criterion::Rms,
-            turns: self.criterion == Criterion::Envelope,
+            with_root_mean_squares: self.criterion == Criterion::Rms,
+            with_turns: self.criterion == Criterion::Envelope,
             gauges: Gauge::ALL
                 .map(|gauge| self.metrics.iter().any(|metric| metric.gauge() == Some(gauge))),
             ..Recorders::default()

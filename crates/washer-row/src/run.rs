@@ -29,7 +29,7 @@ pub struct RowRule {
 impl RowRule {
     /// Returns the recorders that trajectories need.
     pub fn recorders(&self) -> Recorders {
-        Recorders { checkpoints: self.accuracy.is_finite(), ..self.measures.recorders() }
+        Recorders { with_checkpoints: self.accuracy.is_finite(), ..self.measures.recorders() }
     }
 }
 

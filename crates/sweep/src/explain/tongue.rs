@@ -301,7 +301,7 @@ pub(crate) fn find_endings(
     let held_speeds: Vec<HeldSpeed<'_>> = tongues.iter().map(held_speed).collect();
     let responses =
         tongues.iter().map(|tongue| Ok(vec![tongue.fastest_response.clone()])).collect();
-    let starts = StartRule { count: 1, ..StartRule::default() };
+    let starts = StartRule { start_count: 1, ..StartRule::default() };
     let cancel = Cancel::Flag(finder.interrupt.flag());
     let attractors =
         find_attractors_from_responses(finder.simd, &held_speeds, responses, &[], &starts, cancel);

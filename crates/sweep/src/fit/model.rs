@@ -250,7 +250,7 @@ impl Problem<'_> {
         let measurement = &self.cases[case].measurement;
         let end_s = self.cases[case].end_s();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-        let recorders = Recorders { snapshots: true, ..Recorders::default() };
+        let recorders = Recorders { with_snapshots: true, ..Recorders::default() };
         let simulate_group = |group: &[usize]| {
             let numbered_runs = group.iter().map(|&k| machine_and_shift(k)).enumerate();
             let valid_runs =

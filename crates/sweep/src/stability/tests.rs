@@ -62,7 +62,7 @@ fn a_response_with_friction_is_found_without_caps() {
 fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
-    let starts = StartRule { count: 1, ..StartRule::default() };
+    let starts = StartRule { start_count: 1, ..StartRule::default() };
     let result = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never)
         .remove(0)
         .unwrap();
@@ -116,7 +116,7 @@ fn a_textbook_machine_ends_in_its_response() {
     let speeds_rpm = [500.0, 700.0];
     let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-    let starts = StartRule { count: 3, ..StartRule::default() };
+    let starts = StartRule { start_count: 3, ..StartRule::default() };
     let results = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never);
     for (result, rpm) in results.into_iter().zip(speeds_rpm) {
         let result = result.unwrap();

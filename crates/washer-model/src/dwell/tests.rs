@@ -189,9 +189,9 @@ fn slow_decay_is_not_taken_for_a_doubled_period() {
 
 /// Returns a random machine, two of three with friction and one of three with stops, and a speed
 /// (rpm).
-fn random_machine(number: u64, numbers: &mut fastrand::Rng) -> (Value, f64) {
+fn random_machine(number: u64, random_numbers: &mut fastrand::Rng) -> (Value, f64) {
     let machine_kind = number % 3;
-    let mut random_between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+    let mut random_between = |low: f64, high: f64| low + (high - low) * random_numbers.f64();
     let mut keys = json!({
         "unbalance_mass_kg": random_between(0.1, 0.9),
         "damping_n_s_per_m": if machine_kind == 0 {
@@ -222,16 +222,19 @@ fn number_from_env(name: &str, default: u64) -> u64 {
 #[test]
 #[ignore = "short steps: minutes"]
 fn random_motions_continue_unchanged_in_short_steps() {
-    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 35));
+    let mut random_numbers = fastrand::Rng::with_seed(number_from_env("SEED", 35));
     let mut kind_counts = [0; Attractor::KIND_NAMES.len()];
     let mut max_errors = [0.0_f64; 3];
     for number in 0..number_from_env("MACHINES", 12) {
         let machine_kind = (number % 3) as usize;
-        let (keys, speed_rpm) = random_machine(number, &mut numbers);
-        let kick_rad_per_s = 1.0 + 5.0 * numbers.f64();
+        let (keys, speed_rpm) = random_machine(number, &mut random_numbers);
+        let kick_rad_per_s = 1.0 + 5.0 * random_numbers.f64();
         let point = prepare_at(&keys, 100.0, 1.0);
-        let start_rule =
-            StartRule { count: 4, max_kick_rad_per_s: kick_rad_per_s, ..StartRule::default() };
+        let start_rule = StartRule {
+            start_count: 4,
+            max_kick_rad_per_s: kick_rad_per_s,
+            ..StartRule::default()
+        };
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let search_result =
             find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never)
@@ -276,11 +279,11 @@ fn random_motions_continue_unchanged_in_short_steps() {
 #[ignore = "minutes"]
 fn random_kicks_end_in_motions_that_the_search_found() {
     const FOLLOWED_TIME_S: f64 = 180.0;
-    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 404));
+    let mut random_numbers = fastrand::Rng::with_seed(number_from_env("SEED", 404));
     let mut settled_count = 0;
     let mut missed_kicks = Vec::new();
     for number in 0..number_from_env("MACHINES", 6) {
-        let (keys, speed_rpm) = random_machine(number, &mut numbers);
+        let (keys, speed_rpm) = random_machine(number, &mut random_numbers);
         let point = prepare_at(&keys, 100.0, 1.0);
         let held_speeds = [HeldSpeed { point: &point, speed_rpm }];
         let start_rule = StartRule::default();
@@ -295,8 +298,9 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let held_states: Vec<HeldState<'_>> = (0..number_from_env("KICKS", 16))
             .map(|kick| {
                 let mut state = if kick % 2 == 0 { state_at_rest } else { response };
-                let size_rad_per_s = 0.3 * 20.0_f64.powf(numbers.f64());
-                let components: [f64; 4] = core::array::from_fn(|_| 2.0 * numbers.f64() - 1.0);
+                let size_rad_per_s = 0.3 * 20.0_f64.powf(random_numbers.f64());
+                let components: [f64; 4] =
+                    core::array::from_fn(|_| 2.0 * random_numbers.f64() - 1.0);
                 let length =
                     components.iter().map(|component| component * component).sum::<f64>().sqrt();
                 // The shaft moves with the tub. A quarter of a metre is about the tub's radius.

@@ -354,7 +354,7 @@ fn select_lane_coefficients(
 }
 
 /// Selects the terms that are neither at the table's positions nor in the rest column of the
-/// entries `at_rest`.
+/// entries with a part of order zero, `at_rest`.
 fn select_further_terms<const ENTRIES: usize>(
     slopes: &[[f64; COORDINATES]; ENTRIES],
     values: &[f64; ENTRIES],

@@ -31,7 +31,8 @@ lane_struct! {
         tub_acceleration_per_position: [[N<T>; 4]; 4],
         tub_acceleration_per_speed: [[N<T>; 4]; 4],
         tub_acceleration_per_load: [[N<T>; 4]; 4],
-        /// The lower triangle of the bearings' deflections by the tub's accelerations under loads.
+        /// The second derivatives of the bearings' deflection per unit of load on the tub, by the
+        /// tub's accelerations: the lower triangle of a symmetric matrix.
         tub_compliance: [[N<T>; 4]; 4],
         tub_axis: [[N<T>; 2]; 2],
         rotor_inverse_mass: N<T>,
@@ -220,9 +221,9 @@ impl<T: Lane> RotorArrays<T> {
             let arms = rotor_terms::arms(&self.entries);
             let (rotor, compliance) =
                 RotorLoadResponse::new(constants, &self.inverse_inertia, &arms);
-            let system = bearing_system(constants, cap_squared, &compliance);
+            let system_matrix = bearing_system(constants, cap_squared, &compliance);
             self.bearing_arrays = BearingArrays {
-                system_inverse: Symmetric4(system).inverse(),
+                system_inverse: Symmetric4(system_matrix).inverse(),
                 deflection_factor: cap_squared + spin.speed * spin.speed,
                 rotor,
             };

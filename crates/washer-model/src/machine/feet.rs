@@ -181,8 +181,8 @@ impl Feet {
     }
 }
 
-/// Returns the part of the margin against slipping (N) that a load's moment about the vertical uses
-/// up.
+/// Returns the amount (N) by which a load's moment about the vertical reduces the margin against
+/// slipping.
 ///
 /// The cabinet stays in place if the floor force of each foot is within the foot's friction. The
 /// feet share the horizontal force in proportion to their loads; this leaves a moment about the

@@ -113,13 +113,15 @@ impl Machine {
         let dampers = self.dampers.iter().map(|d| ("damper", d.given_length_m())).enumerate();
         for (k, (element, length_m)) in springs.chain(dampers) {
             if length_m < MIN_DISTANCE_M {
-                let number = k + 1;
+                let element_number = k + 1;
                 let length_m = format_rounded(length_m);
-                let end_names =
-                    |end: &str| component_names(&format!("{element}_{number}_{end}_"), "_m");
+                let end_names = |end: &str| {
+                    component_names(&format!("{element}_{element_number}_{end}_"), "_m")
+                };
                 joint_violations.push(Violation::new(
                     format!(
-                        "the ends of {element} {number} are {length_m} m apart: it has no direction"
+                        "the ends of {element} {element_number} are {length_m} m apart: it has no \
+                         direction"
                     ),
                     ["tub", "cabinet"].into_iter().flat_map(end_names),
                     format!("ends at least {MIN_DISTANCE_M:e} m apart"),
@@ -128,10 +130,10 @@ impl Machine {
         }
         for (k, stop) in self.stops.iter().enumerate() {
             if stop.direction_length() < MIN_DISTANCE_M {
-                let number = k + 1;
+                let element_number = k + 1;
                 joint_violations.push(Violation::new(
-                    format!("stop {number} has no direction"),
-                    component_names(&format!("stop_{number}_direction_"), ""),
+                    format!("stop {element_number} has no direction"),
+                    component_names(&format!("stop_{element_number}_direction_"), ""),
                     "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made \
                      1",
                 ));
@@ -144,12 +146,15 @@ impl Machine {
                 for (k, foot) in self.feet.iter().enumerate() {
                     let height_difference_m = foot.foot_m[1] - first_y_m;
                     if height_difference_m.abs() > MIN_DISTANCE_M {
-                        let number = k + 1;
+                        let element_number = k + 1;
                         let distance_m = format_rounded(height_difference_m.abs());
                         let direction = if height_difference_m > 0.0 { "higher" } else { "lower" };
                         joint_violations.push(Violation::new(
-                            format!("foot {number} stands {distance_m} m {direction} than foot 1"),
-                            [format!("foot_{number}_y_m")],
+                            format!(
+                                "foot {element_number} stands {distance_m} m {direction} than \
+                                 foot 1"
+                            ),
+                            [format!("foot_{element_number}_y_m")],
                             "one height for all feet: the second number of foot_m",
                         ));
                     }
@@ -157,26 +162,28 @@ impl Machine {
                 let loads_n = feet.rest_loads_n(self).into_iter().enumerate();
                 let lifted_feet = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
                 joint_violations.extend(lifted_feet.map(|(k, load_n)| {
-                    let number = k + 1;
+                    let element_number = k + 1;
                     Violation::new(
-                        format!("foot {number} lifts at rest: it would carry {load_n:.1} N"),
-                        component_names(&format!("foot_{number}_"), "_m"),
+                        format!(
+                            "foot {element_number} lifts at rest: it would carry {load_n:.1} N"
+                        ),
+                        component_names(&format!("foot_{element_number}_"), "_m"),
                         "feet around the mass centre of cabinet and machine together",
                     )
                 }));
             }
             None if has_cabinet || !self.feet.is_empty() => {
-                let count = self.feet.len();
+                let foot_count = self.feet.len();
                 let expected = match has_cabinet {
                     true => "three or four [[feet]] with foot_m = [x, y, z], not all in a line",
                     false => {
                         "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]"
                     }
                 };
-                let foot_parameters =
-                    (1..=count).flat_map(|foot| component_names(&format!("foot_{foot}_"), "_m"));
+                let foot_parameters = (1..=foot_count)
+                    .flat_map(|foot| component_names(&format!("foot_{foot}_"), "_m"));
                 joint_violations.push(Violation::new(
-                    feet_title(count, has_cabinet),
+                    feet_title(foot_count, has_cabinet),
                     foot_parameters,
                     expected,
                 ));
@@ -186,12 +193,13 @@ impl Machine {
         if !self.further_unbalances.is_empty() {
             for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
-                    let number = k + 1;
-                    let number_prefix = if k == 0 { String::new() } else { format!("{number}_") };
+                    let element_number = k + 1;
+                    let number_prefix =
+                        if k == 0 { String::new() } else { format!("{element_number}_") };
                     joint_violations.push(Violation::new(
                         format!(
-                            "unbalance {number} is on the drum's axis and unbalances nothing, \
-                             beside others"
+                            "unbalance {element_number} is on the drum's axis and unbalances \
+                             nothing, beside others"
                         ),
                         [format!("unbalance_{number_prefix}radius_m")],
                         "a distance from the axis, negative on the other side; a mass on the axis \

@@ -201,16 +201,16 @@ fn follow_halving(
 /// Returns for each mode of `start_modes` the index of the mode of `end_modes` that continues it,
 /// and the least MAC of a pair. Pairs are formed in the order of falling MAC.
 fn match_modes(start_modes: &Modes, end_modes: &Modes) -> ([usize; COORDINATES], f64) {
-    let mut pairs = Vec::with_capacity(COORDINATES * COORDINATES);
+    let mut mode_pairs = Vec::with_capacity(COORDINATES * COORDINATES);
     for (i, before) in start_modes.modes.iter().enumerate() {
         for (j, after) in end_modes.modes.iter().enumerate() {
-            pairs.push((modal_assurance(&end_modes.mass, &before.shape, &after.shape), i, j));
+            mode_pairs.push((modal_assurance(&end_modes.mass, &before.shape, &after.shape), i, j));
         }
     }
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    mode_pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut mode_order = [usize::MAX; COORDINATES];
     let mut min_assurance = 1.0_f64;
-    for (assurance, i, j) in pairs {
+    for (assurance, i, j) in mode_pairs {
         if mode_order[i] == usize::MAX && !mode_order.contains(&j) {
             mode_order[i] = j;
             min_assurance = min_assurance.min(assurance);
@@ -279,19 +279,19 @@ fn find_resonance(
         })?;
         let resonance =
             Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
-        let excess = resonance.mode.frequency_rpm - speed_rpm;
-        if excess.abs() < RESONANCE_TOLERANCE_RPM {
+        let frequency_excess_rpm = resonance.mode.frequency_rpm - speed_rpm;
+        if frequency_excess_rpm.abs() < RESONANCE_TOLERANCE_RPM {
             return Ok(Some(resonance));
         }
         if high_rpm - low_rpm < RESONANCE_TOLERANCE_RPM {
             break;
         }
-        if (excess > 0.0) == (high_excess > 0.0) {
-            (high_rpm, high_excess) = (speed_rpm, excess);
+        if (frequency_excess_rpm > 0.0) == (high_excess > 0.0) {
+            (high_rpm, high_excess) = (speed_rpm, frequency_excess_rpm);
             low_excess *= if last_moved_side == 1 { 0.5 } else { 1.0 };
             last_moved_side = 1;
         } else {
-            (low_rpm, low_excess) = (speed_rpm, excess);
+            (low_rpm, low_excess) = (speed_rpm, frequency_excess_rpm);
             high_excess *= if last_moved_side == -1 { 0.5 } else { 1.0 };
             last_moved_side = -1;
         }

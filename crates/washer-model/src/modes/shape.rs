@@ -173,8 +173,8 @@ fn rigid_energy_shares(
                 rigid_vector[i][0] -= projection * basis_vector[i][0];
             }
         }
-        let scale = mass_inner_product(mass, &rigid_vector, &rigid_vector)[0].sqrt();
-        basis.push(rigid_vector.map(|[re, _]| [re / scale, 0.0]));
+        let mass_norm = mass_inner_product(mass, &rigid_vector, &rigid_vector)[0].sqrt();
+        basis.push(rigid_vector.map(|[re, _]| [re / mass_norm, 0.0]));
     }
     core::array::from_fn(|k| {
         let [re, im] = mass_inner_product(mass, &basis[k], shape);
@@ -240,13 +240,13 @@ mod tests {
         let seed =
             std::env::var("SEED").map_or(time_since_epoch.as_secs(), |text| text.parse().unwrap());
         println!("SEED={seed}");
-        let mut numbers = fastrand::Rng::with_seed(seed);
+        let mut random_numbers = fastrand::Rng::with_seed(seed);
         let mut translation_count = 0;
         let mut rocking_count = 0;
         let mut mixed_count = 0;
         for _ in 0..40 {
             let mut machine = crate::Machine::paper();
-            let mut random_factor = || 0.4 * 6.0_f64.powf(numbers.f64());
+            let mut random_factor = || 0.4 * 6.0_f64.powf(random_numbers.f64());
             machine.tub.mass_kg *= random_factor();
             machine.tub.centre_x_m *= random_factor();
             machine.tub.inertia_kg_m2 =

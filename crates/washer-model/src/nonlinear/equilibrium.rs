@@ -45,7 +45,7 @@ const MIN_STIFFNESS_SHIFT: f64 = 10.0;
 /// iteration.
 const MAX_STIFFNESS_SHIFT: f64 = 1e9;
 
-/// A call of [`solve_equilibrium`] that is not inlined into kernels.
+/// The solution of [`solve_equilibrium`], which is not inlined into kernels.
 pub(crate) struct EquilibriumSolution<'a, T> {
     pub(crate) zero: N<T>,
     pub(crate) machine: &'a MachineCoefficients<T>,

@@ -72,7 +72,8 @@ impl FrontDeflection {
 /// The jumps of the drum's acceleration in a run.
 #[derive(Clone, Debug)]
 pub(crate) struct AccelerationJumps {
-    /// The jumps before the end of the window, by the time for which the drum stands after them.
+    /// The jumps before the end of the window, grouped by the time for which the drum stands
+    /// after them.
     before_window_end: Vec<JumpGroup>,
     /// The sum of all jumps of the run (rad/s^2).
     sum_rad_per_s2: f64,
@@ -254,8 +255,8 @@ impl Ringing {
 /// bearings and hinge.
 struct UnsuspendedMachine<'a> {
     matrices: &'a Matrices,
-    /// The factors of the rigid body's mass matrix S' M S, with the sums S over the coordinates
-    /// of tub and shaft.
+    /// The factors of the rigid body's mass matrix S' M S; each column of S has ones at a pair of
+    /// [`RIGID_COORDINATE_PAIRS`].
     rigid_mass_factors: Lu<4>,
 }
 

@@ -13,13 +13,13 @@ use crate::nonlinear::outputs::{RADIAL_COMPONENTS, squared_distance};
 use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{IntervalPeaks, Lane, N, OutOfLine, Sample, SquareIntegrals, TimeAbove};
 
-/// The number of parts of a long step at whose ends loads are evaluated.
+/// The number of parts into which a long step is divided; loads are evaluated at their ends.
 ///
 /// Basis: steps of order 8 last a few ms, and forces peak within them; not measured. Doubling it
 /// doubles the cost of loads.
 const LONG_STEP_SUBSTEPS: u32 = 4;
 
-/// The length (s) of the parts of a step with capped modes.
+/// The length (s) of the parts into which a step with capped modes is divided.
 ///
 /// Basis: forty parts in a period of 25 Hz, the turns of a drum at 1500 rpm. Doubling it halves the
 /// cost of loads and misses more of their peaks.
@@ -79,7 +79,7 @@ impl<T: Lane> ActiveRecorders<T> {
         if !recorders.need_all_states() {
             return None;
         }
-        let snapshots = if recorders.snapshots { Some(Snapshots::new(zero)) } else { None };
+        let snapshots = if recorders.with_snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             recorders,
             square_integrals: SquareIntegrals::new(zero),
@@ -98,7 +98,7 @@ impl<T: Lane> ActiveRecorders<T> {
         let clearance_m = point.machine.bodies.clearance.0;
         self.clash_time.reset(lane);
         self.clearance_squared.0.set(lane, clearance_m * clearance_m);
-        if self.recorders.turns {
+        if self.recorders.with_turns {
             self.turn_peaks
                 .reset(lane, &turn_division_times_s(&point.spin_segments, point.window_s()));
         }
@@ -114,7 +114,7 @@ impl<T: Lane> ActiveRecorders<T> {
     /// `index`. A failed trajectory has no readings.
     pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, has_failed: bool) {
         let recorders = self.recorders;
-        let turns = if recorders.turns { self.turn_peaks.finish(lane) } else { Vec::new() };
+        let turns = if recorders.with_turns { self.turn_peaks.finish(lane) } else { Vec::new() };
         let snapshots = match &mut self.snapshots {
             Some(snapshots) => snapshots.finish(lane),
             None => Vec::new(),
@@ -131,7 +131,7 @@ impl<T: Lane> ActiveRecorders<T> {
             Some(loads) => loads.gauge_values(gauge, lane, point),
             None => Vec::new(),
         });
-        let root_mean_squares = match recorders.root_mean_squares {
+        let root_mean_squares = match recorders.with_root_mean_squares {
             true => Some(self.square_integrals.lane_integrals(lane).map(to_root_mean_square)),
             false => None,
         };
@@ -169,7 +169,7 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
             lanes_in_window,
         } = self;
         let recorders = active_recorders.recorders;
-        if recorders.root_mean_squares {
+        if recorders.with_root_mean_squares {
             match step {
                 Some((_, length_s)) => {
                     active_recorders.square_integrals.advance(length_s, channels, lanes_in_window)
@@ -177,7 +177,7 @@ impl<T: Lane> OutOfLine for ObservedState<'_, T> {
                 None => active_recorders.square_integrals.begin(channels),
             }
         }
-        if recorders.turns {
+        if recorders.with_turns {
             match step {
                 Some((end_s, length_s)) => {
                     active_recorders.turn_peaks.advance(end_s, length_s, channels, lanes_in_window)

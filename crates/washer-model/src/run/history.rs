@@ -76,9 +76,9 @@ pub fn integrate_history<'a>(
     let times_s = (0..instant_count(end_s, interval_s)).map(|k| k as f64 * interval_s).collect();
     let requests =
         [HistoryRequest { point, method: *method, initial_deviation: *initial_deviation, times_s }];
-    let samples = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
+    let sampled_states = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
     let [request] = requests;
-    History::new(model, request, samples)
+    History::new(model, request, sampled_states)
 }
 
 /// Returns the number of instants from 0 to `end_s` at intervals of `interval_s`.
@@ -117,8 +117,8 @@ pub fn integrate_histories<'a>(
         if batch.is_empty() {
             return histories;
         }
-        let samples = integrate(model, &batch, cancel);
-        for (request, states) in batch.into_iter().zip(samples) {
+        let sampled_states = integrate(model, &batch, cancel);
+        for (request, states) in batch.into_iter().zip(sampled_states) {
             histories.push(History::new(model, request, states));
         }
     }
@@ -179,7 +179,7 @@ impl<'a> History<'a> {
         self.states.len()
     }
 
-    /// Always false, because the start is an instant.
+    /// Returns false, because every history has the instant of its start.
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }

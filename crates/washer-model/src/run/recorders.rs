@@ -9,17 +9,17 @@ use crate::channel::CHANNELS;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Recorders {
     /// Whether root mean squares of the channels are computed.
-    pub root_mean_squares: bool,
+    pub with_root_mean_squares: bool,
     /// Whether the largest deviations in every turn of the drum are recorded.
-    pub turns: bool,
+    pub with_turns: bool,
     /// The [`Gauge`](super::Gauge)s in use.
     pub gauges: GaugeSelection,
     /// Whether the coordinates at the ends of segments are recorded
-    /// ([`Timing::checkpoints`](crate::Timing)).
-    pub checkpoints: bool,
+    /// ([`Timing::with_checkpoints`](crate::Timing)).
+    pub with_checkpoints: bool,
     /// Whether all outputs are recorded at instants of the point within the window
     /// ([`Point::with_snapshots_at`](crate::Point::with_snapshots_at)).
-    pub snapshots: bool,
+    pub with_snapshots: bool,
 }
 
 /// The readings of [`Recorders`] for one trajectory, within the window.
@@ -63,6 +63,6 @@ impl Recorders {
 
     /// Returns whether any recorder needs the states between the ends of segments.
     pub(crate) fn need_all_states(self) -> bool {
-        Self { checkpoints: false, ..self } != Self::default()
+        Self { with_checkpoints: false, ..self } != Self::default()
     }
 }

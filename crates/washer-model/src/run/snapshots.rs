@@ -175,7 +175,7 @@ mod tests {
             .into_iter()
             .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants_s)))
             .collect();
-        let recorders = Recorders { snapshots: true, ..Recorders::default() };
+        let recorders = Recorders { with_snapshots: true, ..Recorders::default() };
         let method = Method::rk4(2e-4);
         for model in ModelKind::ALL {
             let all_points: Vec<&Point> = points.iter().collect();

@@ -53,14 +53,15 @@ const MIN_STEP_LENGTH: f64 = 1e-3;
 /// the greatest length again. Derivatives at few instants may be the reason for short steps.
 const ALL_INSTANTS_STEP_LENGTH: f64 = 0.5;
 
-/// The factor of a step's length after few corrections. Basis: steps of most curves have the
+/// The factor by which the step grows after few corrections. Basis: steps of most curves have the
 /// longest length. Doubling it makes more steps fail.
 const STEP_INCREASE_FACTOR: f64 = 1.6;
 /// The greatest number of corrections after which the step grows. Basis: a curve that hardly bends
 /// takes four. Doubling it makes all steps longer until they fail.
 const MAX_CORRECTIONS_TO_GROW: usize = 4;
 
-/// The factor of a step's length after many corrections. Basis: about half the bend of the curve.
+/// The factor by which the step shrinks after many corrections. Basis: it halves the bend of the
+/// curve within a step.
 /// Doubling it makes steps longer.
 const STEP_DECREASE_FACTOR: f64 = 0.7;
 /// The least number of corrections after which the step shrinks. Basis: one more than the number
@@ -83,8 +84,9 @@ const NODE_TOLERANCE: f64 = 1e-7;
 /// turn is rejected.
 const MIN_TANGENT_COSINE: f64 = 0.8;
 
-/// The greatest correction of a node, as a share of its distance from the last node. A node with a
-/// greater one may be on another part of the curve, and its step is rejected.
+/// The greatest distance of a node from its predicted point, as a share of the node's distance from
+/// the last node. A step with a greater ratio is rejected, because its node may be on another part
+/// of the curve.
 const MAX_CORRECTION_SHARE: f64 = 0.5;
 
 /// The greatest distance between a node and its predicted point at which a tangent from derivatives

@@ -33,8 +33,8 @@ pub(crate) fn scale_speeds(matrix: &StateMatrix, unit_per_s: f64) -> Mat<f64> {
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * component_unit(j) / component_unit(i))
 }
 
-/// The number of vector registers' worth of disturbances that are integrated through a step at
-/// once. Basis: they fit in the first-level cache. Doubling it is slower.
+/// The number of vector registers with disturbances that are integrated through a step at once.
+/// Basis: they fit in the first-level cache. Doubling it is slower.
 const VECTORS_PER_BLOCK: usize = 5;
 /// The number of the widest vectors that hold all disturbances. Basis: the number of states.
 /// Doubling it leaves lanes empty.

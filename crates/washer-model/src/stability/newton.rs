@@ -73,9 +73,9 @@ const QUADRATIC_CONVERGENCE_RESIDUAL: f64 = 1e-3;
 /// should find.
 const REPULSION_RANGE: f64 = 5e-3;
 
-/// The largest difference from 1 of a step's factor with which a search may end. Basis: a search
-/// that has converged takes steps of 1e-7 of a known response's distance, whose factor differs from
-/// 1 by as much. Doubling it changes nothing for such searches.
+/// The largest difference from 1 of the factor of a Newton step with which a search may end. Basis:
+/// a search that has converged takes steps of 1e-7 of a known response's distance, whose factor
+/// differs from 1 by as much. Doubling it changes nothing for such searches.
 const MAX_FINAL_DEFLATION: f64 = 1e-3;
 
 /// Returns the distance of a turn's end from its start, relative to its deviation from equilibrium;

@@ -231,8 +231,8 @@ impl<'a> ResponseCurves<'a> {
                 let first_rpm = curves[*curve].upward_curve.settings.lowest_rpm();
                 let is_on_curve = first_rpm.is_ok_and(|first_rpm| *speed_rpm < first_rpm);
                 let guess = guess_from_linear(held_case.setup.point, &linear_response);
-                let position = if is_off_curve { 0 } else { guesses.len() };
-                guesses.insert(position, Guess { branch, is_on_curve, ..guess });
+                let insert_index = if is_off_curve { 0 } else { guesses.len() };
+                guesses.insert(insert_index, Guess { branch, is_on_curve, ..guess });
             }
             for guess in guesses {
                 searches.push(NewtonSearch::new(

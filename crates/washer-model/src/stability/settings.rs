@@ -196,8 +196,8 @@ struct RangeSetting {
 }
 
 /// Returns the lower end (rpm) of the speed range with an index.
-fn range_start_rpm(range: i64) -> f64 {
-    libm::exp2(range as f64 / SPEED_RANGES_PER_OCTAVE)
+fn range_start_rpm(range_index: i64) -> f64 {
+    libm::exp2(range_index as f64 / SPEED_RANGES_PER_OCTAVE)
 }
 
 impl<'a> Settings<'a> {
@@ -321,15 +321,15 @@ impl<'a> Settings<'a> {
         speed_rpm: f64,
         purpose: Purpose,
     ) -> Result<HeldCase<'a>, ResponseError> {
-        let range = (SPEED_RANGES_PER_OCTAVE * libm::log2(speed_rpm)).floor() as i64;
+        let range_index = (SPEED_RANGES_PER_OCTAVE * libm::log2(speed_rpm)).floor() as i64;
         let limits = match purpose {
             Purpose::Response => RESPONSE_LIMITS,
             Purpose::Continuation => CONTINUATION_LIMITS,
         };
-        let known_setting = self.settings_by_range.get(&(range, purpose)).cloned();
+        let known_setting = self.settings_by_range.get(&(range_index, purpose)).cloned();
         let setting = known_setting.unwrap_or_else(|| {
-            let setting = self.choose_setting(range, &limits);
-            self.settings_by_range.insert((range, purpose), setting.clone());
+            let setting = self.choose_setting(range_index, &limits);
+            self.settings_by_range.insert((range_index, purpose), setting.clone());
             setting
         });
         let RangeSetting { frozen_modes, step_count, is_capped } = setting?;
@@ -343,12 +343,12 @@ impl<'a> Settings<'a> {
     }
 
     /// Returns the modes at the lower end of a range.
-    fn modes_at_range_start(&mut self, range: i64) -> Result<Arc<Modes>, ResponseError> {
+    fn modes_at_range_start(&mut self, range_index: i64) -> Result<Arc<Modes>, ResponseError> {
         let compute_modes =
-            || modes(&self.frictionless_point, 0.0, range_start_rpm(range) * TAU / 60.0);
+            || modes(&self.frictionless_point, 0.0, range_start_rpm(range_index) * TAU / 60.0);
         let checked_modes =
             || compute_modes().map(Arc::new).map_err(|_| ResponseError::NoEigenvalues);
-        self.modes_by_range.entry(range).or_insert_with(checked_modes).clone()
+        self.modes_by_range.entry(range_index).or_insert_with(checked_modes).clone()
     }
 
     /// Chooses the number of steps that the suspension's modes need in a range of speeds, and the
@@ -357,13 +357,13 @@ impl<'a> Settings<'a> {
     /// capped.
     fn choose_setting(
         &mut self,
-        range: i64,
+        range_index: i64,
         limits: &AccuracyLimits,
     ) -> Result<RangeSetting, ResponseError> {
         let point = self.point;
-        let bounds_rpm = [range, range + 1].map(range_start_rpm);
+        let bounds_rpm = [range_index, range_index + 1].map(range_start_rpm);
         let frozen_modes =
-            [self.modes_at_range_start(range)?, self.modes_at_range_start(range + 1)?];
+            [self.modes_at_range_start(range_index)?, self.modes_at_range_start(range_index + 1)?];
         let modes_at_rest = self.modes_at_rest.as_ref().ok_or(ResponseError::NoEigenvalues)?;
         let turn_s = 60.0 / bounds_rpm[0];
         let highest_frequency_rad_per_s =

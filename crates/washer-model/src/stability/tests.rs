@@ -112,10 +112,10 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
             ["growth_per_s", "frequency_cpm"].map(|name| read_number(&case, name));
         // If all disturbances decay, the slowest is that of the hinge, which is not compared.
         if growth > 0.0 {
-            let difference = computed_response.growth_per_s() - growth;
-            assert!(difference.abs() < 1e-3, "{case}: {difference:e}");
-            let difference = computed_response.frequency_cpm() - frequency;
-            assert!(difference.abs() < 1e-2, "{case}: {difference:e}");
+            let growth_difference_per_s = computed_response.growth_per_s() - growth;
+            assert!(growth_difference_per_s.abs() < 1e-3, "{case}: {growth_difference_per_s:e}");
+            let frequency_difference_cpm = computed_response.frequency_cpm() - frequency;
+            assert!(frequency_difference_cpm.abs() < 1e-2, "{case}: {frequency_difference_cpm:e}");
         }
         for (channel, name) in [(6, "amplitude_tub_yaw_rad"), (7, "amplitude_tub_pitch_rad")] {
             let error = computed_response.nonlinear_peaks[channel] / read_number(&case, name) - 1.0;
@@ -189,9 +189,12 @@ fn multipliers_are_those_of_the_machine_without_caps() {
             .min_by(|a, b| (**a - mu).norm().total_cmp(&(**b - mu).norm()))
             .map(|mu| growth_per_s([mu.re, mu.im], speed_rpm))
             .unwrap();
-        let difference = computed_response.growth_per_s() - nearest;
-        println!("{speed_rpm}: {} {difference:e}", computed_response.growth_per_s());
-        assert!(difference.abs() < 2e-4, "{speed_rpm}: {nearest} {difference:e}");
+        let growth_difference_per_s = computed_response.growth_per_s() - nearest;
+        println!("{speed_rpm}: {} {growth_difference_per_s:e}", computed_response.growth_per_s());
+        assert!(
+            growth_difference_per_s.abs() < 2e-4,
+            "{speed_rpm}: {nearest} {growth_difference_per_s:e}"
+        );
         // No other disturbance grows; the hinge's disturbances decay slowly.
         for other in expected.iter().map(|mu| growth_per_s([mu.re, mu.im], speed_rpm)) {
             let is_at_most_nearest = other <= nearest.max(-0.1) + 1e-9;
@@ -215,9 +218,9 @@ fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
     for stiffness_n_per_m in [1e9, 5e10] {
         let growth_per_s = growth_at(stiffness_n_per_m);
         println!("{stiffness_n_per_m:e} N/m: {growth_per_s}, uncapped {uncapped_per_s}");
-        let difference = growth_per_s / uncapped_per_s - 1.0;
+        let relative_difference = growth_per_s / uncapped_per_s - 1.0;
         assert!(
-            difference.abs() < 0.1,
+            relative_difference.abs() < 0.1,
             "{stiffness_n_per_m:e} N/m: {growth_per_s}, {uncapped_per_s}"
         );
     }
@@ -310,13 +313,21 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
         };
         (0..60).map(displacements_at).collect()
     };
-    let single = turn_changes(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
-    assert!((largest_multiplier(&single) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&single));
-    let pair = turn_changes(&|k| {
-        let size = 1.07_f64.powi(k);
-        [size * (2.1 * f64::from(k)).cos(), size * (2.1 * f64::from(k)).sin()]
+    let single_changes = turn_changes(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
+    assert!(
+        (largest_multiplier(&single_changes) - 1.09).abs() < 1e-6,
+        "{}",
+        largest_multiplier(&single_changes)
+    );
+    let pair_changes = turn_changes(&|k| {
+        let growth_factor = 1.07_f64.powi(k);
+        [growth_factor * (2.1 * f64::from(k)).cos(), growth_factor * (2.1 * f64::from(k)).sin()]
     });
-    assert!((largest_multiplier(&pair) - 1.07).abs() < 1e-6, "{}", largest_multiplier(&pair));
+    assert!(
+        (largest_multiplier(&pair_changes) - 1.07).abs() < 1e-6,
+        "{}",
+        largest_multiplier(&pair_changes)
+    );
     let real_pair = turn_changes(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
     assert!(
         (largest_multiplier(&real_pair) - 1.09).abs() < 1e-6,
@@ -325,9 +336,9 @@ fn the_largest_multiplier_is_found_of_one_to_three() {
     );
     // The pair and the third multiplier grow nearly equally fast.
     let pair_and_real = turn_changes(&|k| {
-        let size = 1.25_f64.powi(k);
-        let pair = size * (2.1 * f64::from(k)).cos();
-        [pair, 0.5 * size * (2.1 * f64::from(k)).sin() + (-1.2_f64).powi(k)]
+        let growth_factor = 1.25_f64.powi(k);
+        let pair = growth_factor * (2.1 * f64::from(k)).cos();
+        [pair, 0.5 * growth_factor * (2.1 * f64::from(k)).sin() + (-1.2_f64).powi(k)]
     });
     assert!(
         (largest_multiplier(&pair_and_real) - 1.25).abs() < 1e-6,
@@ -419,11 +430,14 @@ fn the_product_of_all_multipliers_is_the_exponential_of_the_trace() {
     let setup = TurnSetup { step_count: 32 * capped_setup.step_count, ..capped_setup };
     let nearby_start = response_at(machine_with(0.4, 140.0), 250.0).start_state;
     let (start_state, multipliers) = find_response(&setup, nearby_start);
-    let product = multipliers.into_iter().product::<c64>();
+    let multiplier_product = multipliers.into_iter().product::<c64>();
     let trace_integral = Simd::one_lane(TraceIntegral { setup, start_state });
-    let error = product.re.ln() / trace_integral - 1.0;
-    println!("{product} {trace_integral} {error:e}");
-    assert!(error.abs() < 1e-5 && product.im.abs() < 1e-9, "{product} {trace_integral} {error:e}");
+    let error = multiplier_product.re.ln() / trace_integral - 1.0;
+    println!("{multiplier_product} {trace_integral} {error:e}");
+    assert!(
+        error.abs() < 1e-5 && multiplier_product.im.abs() < 1e-9,
+        "{multiplier_product} {trace_integral} {error:e}"
+    );
 }
 
 #[test]
@@ -440,12 +454,12 @@ fn responses_do_not_depend_on_other_requests() {
                 .map(|speed_rpm| HeldSpeed { point: &point_with_elements, speed_rpm }),
         )
         .collect();
-    let answers = all_responses(&held_speeds);
-    for (held_speed, answer) in held_speeds.iter().zip(&answers).step_by(8) {
+    let results_by_speed = all_responses(&held_speeds);
+    for (held_speed, answer) in held_speeds.iter().zip(&results_by_speed).step_by(8) {
         assert_eq!(&all_responses(&[*held_speed])[0], answer);
     }
     // The first speed, 20 rpm, is below the beginning of the curve.
-    assert!(answers[0].as_ref().unwrap()[0].is_on_curve);
+    assert!(results_by_speed[0].as_ref().unwrap()[0].is_on_curve);
 }
 
 /// The independent program followed the responses up and down in steps of 0.25 rpm, until it lost
@@ -482,8 +496,11 @@ fn val_branches_match_an_independent_program() {
                 }
                 let growth = read_number(reference_row, "growth_per_s");
                 if growth > 0.0 {
-                    let difference = computed_response.growth_per_s() - growth;
-                    assert!(difference.abs() < 5e-3, "{reference_row}: {difference:e}");
+                    let growth_difference_per_s = computed_response.growth_per_s() - growth;
+                    assert!(
+                        growth_difference_per_s.abs() < 5e-3,
+                        "{reference_row}: {growth_difference_per_s:e}"
+                    );
                 }
                 folds_rpm.extend(computed_response.fold_speeds_rpm);
             }
@@ -526,8 +543,8 @@ fn if_the_upward_curve_is_lost_a_downward_curve_is_continued() {
 
 /// Returns the paper's machine with masses, inertias, stiffnesses, damping and unbalance multiplied
 /// by random factors.
-fn random_machine(numbers: &mut fastrand::Rng) -> Machine {
-    let mut random_factor = |low: f64, high: f64| low * (high / low).powf(numbers.f64());
+fn random_machine(random_numbers: &mut fastrand::Rng) -> Machine {
+    let mut random_factor = |low: f64, high: f64| low * (high / low).powf(random_numbers.f64());
     let mut machine = machine_with(random_factor(0.05, 1.5), random_factor(30.0, 250.0));
     machine.tub.mass_kg *= random_factor(0.5, 2.0);
     machine.drum.mass_kg *= random_factor(0.5, 2.0);
@@ -541,13 +558,13 @@ fn random_machine(numbers: &mut fastrand::Rng) -> Machine {
 }
 
 /// Adds friction in the dampers and stops at both sides to a machine.
-fn add_elements(machine: &mut Machine, numbers: &mut fastrand::Rng) {
-    let friction_n = 5.0 + 75.0 * numbers.f64();
+fn add_elements(machine: &mut Machine, random_numbers: &mut fastrand::Rng) {
+    let friction_n = 5.0 + 75.0 * random_numbers.f64();
     for damper in &mut machine.dampers {
         damper.friction_n = friction_n;
         damper.friction_linear_speed_m_per_s = Some(0.1);
     }
-    let clearance_m = 0.004 + 0.016 * numbers.f64();
+    let clearance_m = 0.004 + 0.016 * random_numbers.f64();
     machine.stops = [1.0, -1.0]
         .map(|side| BumpStop {
             tub_m: [0.35, 0.0, 0.28 * side],
@@ -569,7 +586,7 @@ fn growth_of_random_machines_agrees_with_simulations() {
     let number_from_env = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |text| text.parse().unwrap())
     };
-    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 2026));
+    let mut random_numbers = fastrand::Rng::with_seed(number_from_env("SEED", 2026));
     let mut growing_counts = [0, 0];
     let mut decaying_counts = [0, 0];
     let mut max_error = [0.0_f64; 2];
@@ -582,16 +599,17 @@ fn growth_of_random_machines_agrees_with_simulations() {
             break;
         }
         let machine_kind = (number % 2) as usize;
-        let mut machine = random_machine(&mut numbers);
+        let mut machine = random_machine(&mut random_numbers);
         if machine_kind == 1 {
-            add_elements(&mut machine, &mut numbers);
+            add_elements(&mut machine, &mut random_numbers);
         }
         let point = prepare_at_speed(machine.clone(), 100.0);
-        let speeds_rpm: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * numbers.f64()).collect();
+        let speeds_rpm: Vec<f64> = (0..40).map(|_| 60.0 + 300.0 * random_numbers.f64()).collect();
         let held_speeds: Vec<_> =
             speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-        let results = all_responses(&held_speeds);
-        let first_responses = || results.iter().flatten().filter_map(|responses| responses.first());
+        let results_by_speed = all_responses(&held_speeds);
+        let first_responses =
+            || results_by_speed.iter().flatten().filter_map(|responses| responses.first());
         for response in first_responses()
             .filter(|response| (0.2..2.0).contains(&response.growth_per_s()))
             .take(2)
@@ -636,25 +654,28 @@ fn no_branch_is_lost_between_two_others() {
     let number_from_env = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |text| text.parse().unwrap())
     };
-    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 61));
+    let mut random_numbers = fastrand::Rng::with_seed(number_from_env("SEED", 61));
     let mut speeds_with_several = 0;
     let mut violations = Vec::new();
     for number in 0..number_from_env("MACHINES", 4) {
-        let mut machine = random_machine(&mut numbers);
-        let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
+        let mut machine = random_machine(&mut random_numbers);
+        let damping_n_s_per_m = 10.0 + 50.0 * random_numbers.f64();
         machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = damping_n_s_per_m);
-        machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = 5e6 * numbers.f64());
+        machine
+            .springs
+            .iter_mut()
+            .for_each(|spring| spring.cubic_n_per_m3 = 5e6 * random_numbers.f64());
         let point = prepare_at_speed(machine, 100.0);
-        let speeds_rpm: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
+        let speeds_rpm: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * random_numbers.f64()).collect();
         let held_speeds: Vec<_> =
             speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
         for (responses, speed_rpm) in all_responses(&held_speeds).into_iter().zip(speeds_rpm) {
             let Ok(responses) = responses else { continue };
             let curve_responses = responses.iter().filter(|response| response.is_on_curve);
             let branches: Vec<u32> = curve_responses.map(|response| response.branch).collect();
-            let alternates = |pair: &[u32]| pair[0] % 2 != pair[1] % 2;
+            let alternates_parity = |pair: &[u32]| pair[0] % 2 != pair[1] % 2;
             speeds_with_several += usize::from(branches.len() > 1);
-            if !branches.windows(2).all(alternates) {
+            if !branches.windows(2).all(alternates_parity) {
                 violations.push((number, speed_rpm, branches));
             }
         }
@@ -668,10 +689,11 @@ fn no_branch_is_lost_between_two_others() {
 #[test]
 #[ignore = "minutes of work"]
 fn continued_responses_are_those_of_short_steps() {
-    let count = 30;
-    let mut numbers = fastrand::Rng::with_seed(32);
-    let points: Vec<Point> =
-        (0..count).map(|_| prepare_at_speed(random_machine(&mut numbers), 100.0)).collect();
+    let machine_count = 30;
+    let mut random_numbers = fastrand::Rng::with_seed(32);
+    let points: Vec<Point> = (0..machine_count)
+        .map(|_| prepare_at_speed(random_machine(&mut random_numbers), 100.0))
+        .collect();
     let speed_rpm_at = |step: u32| 60.0 + 0.05 * f64::from(step);
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
     let mut states: Vec<Option<[f64; STATES]>> = points
@@ -680,8 +702,8 @@ fn continued_responses_are_those_of_short_steps() {
         .collect();
     // The change of each response by the last step. Near a resonance responses change much in a
     // step, but by similar amounts in successive steps.
-    let mut last_changes = vec![0.0_f64; count];
-    let mut samples = Vec::new();
+    let mut last_changes = vec![0.0_f64; machine_count];
+    let mut state_samples = Vec::new();
     let mut max_error = 0.0_f64;
     let mut lost_speeds = Vec::new();
     for step in 1..=6000 {
@@ -714,31 +736,35 @@ fn continued_responses_are_those_of_short_steps() {
         }
         if step % 100 == 0 {
             let current_states = states.iter().enumerate();
-            samples.extend(
+            state_samples.extend(
                 current_states.filter_map(|(k, state)| Some((k, speed_rpm_at(step), (*state)?))),
             );
         }
     }
     // The samples are sorted by point, so that the curve of each point is continued once.
-    samples.sort_by_key(|(k, ..)| *k);
-    let held_speeds: Vec<_> = samples
+    state_samples.sort_by_key(|(k, ..)| *k);
+    let held_speeds: Vec<_> = state_samples
         .iter()
         .map(|&(k, speed_rpm, _)| HeldSpeed { point: &points[k], speed_rpm })
         .collect();
-    for (responses, (k, speed_rpm, state)) in all_responses(&held_speeds).into_iter().zip(&samples)
+    for (responses, (k, speed_rpm, state)) in
+        all_responses(&held_speeds).into_iter().zip(&state_samples)
     {
-        let difference = responses.map_or(f64::NAN, |responses| {
-            let difference =
+        let state_difference = responses.map_or(f64::NAN, |responses| {
+            let state_difference =
                 (0..COORDINATES).map(|i| (responses[0].start_state[i] - state[i]).abs());
-            difference.fold(0.0, f64::max)
+            state_difference.fold(0.0, f64::max)
         });
-        max_error = max_error.max(difference);
-        if difference.is_nan() || difference >= 1e-6 {
-            println!("machine {k} at {speed_rpm} rpm: {difference:e}");
+        max_error = max_error.max(state_difference);
+        if state_difference.is_nan() || state_difference >= 1e-6 {
+            println!("machine {k} at {speed_rpm} rpm: {state_difference:e}");
         }
-        assert!(!difference.is_nan());
+        assert!(!state_difference.is_nan());
     }
-    println!("{} compared, at most {max_error:e} apart; jumps: {lost_speeds:?}", samples.len());
+    println!(
+        "{} compared, at most {max_error:e} apart; jumps: {lost_speeds:?}",
+        state_samples.len()
+    );
     for (k, lost_rpm) in lost_speeds {
         let ends = responses_of_point(&points[k], &[lost_rpm - 0.3])[0].fold_speeds_rpm;
         assert!(ends[1].is_some_and(|fold| (fold - lost_rpm).abs() < 0.3), "{k}: {ends:?}");
@@ -775,11 +801,12 @@ fn responses_near_resonances_of_the_hinge_are_those_without_caps() {
     for (computed_response, uncapped) in computed_response.iter().zip(uncapped_searches) {
         let uncapped_peaks = uncapped.into_response().unwrap().1.peaks;
         for k in 0..CHANNELS {
-            let difference = (computed_response.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
-            max_error = max_error.max(difference);
+            let relative_difference =
+                (computed_response.nonlinear_peaks[k] / uncapped_peaks[k] - 1.0).abs();
+            max_error = max_error.max(relative_difference);
             assert!(
-                difference < 6e-5,
-                "{} rpm, channel {k}: {difference:e}",
+                relative_difference < 6e-5,
+                "{} rpm, channel {k}: {relative_difference:e}",
                 computed_response.speed_rpm
             );
         }
@@ -816,8 +843,11 @@ fn val_machines_with_elements_match_an_independent_program() {
             // If all disturbances decay, the slowest is that of the hinge, which is not compared.
             let growth = read_number(reference_row, "growth_per_s");
             if growth > 0.0 {
-                let difference = computed_response.growth_per_s() - growth;
-                assert!(difference.abs() < 1e-3, "{description}: {difference:e}");
+                let growth_difference_per_s = computed_response.growth_per_s() - growth;
+                assert!(
+                    growth_difference_per_s.abs() < 1e-3,
+                    "{description}: {growth_difference_per_s:e}"
+                );
             }
             compared_count += 1;
         }
@@ -834,9 +864,10 @@ fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
     println!("{} {}", first_mode.frequency_rpm(), first_mode.frozen_mode.frequency_rpm());
     assert!((first_mode.frequency_rpm() - 65.20).abs() < 0.01);
     let second_mode = floquet_modes(&point, 147.76).unwrap()[1];
-    let difference = second_mode.damping_ratio() / second_mode.frozen_mode.damping_ratio() - 1.0;
-    println!("{difference}");
-    assert!((difference.abs() - 0.08).abs() < 0.03, "{difference}");
+    let damping_difference =
+        second_mode.damping_ratio() / second_mode.frozen_mode.damping_ratio() - 1.0;
+    println!("{damping_difference}");
+    assert!((damping_difference.abs() - 0.08).abs() < 0.03, "{damping_difference}");
 }
 
 #[test]
@@ -867,8 +898,11 @@ fn cost() {
         .map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + 0.25 * f64::from(k) })
         .collect();
     let start_time = std::time::Instant::now();
-    let count = all_responses(&held_speeds).iter().filter(|a| a.is_ok()).count();
-    println!("{:.3} ms each, {count} found", 1e3 * start_time.elapsed().as_secs_f64() / 560.0);
+    let found_count = all_responses(&held_speeds).iter().filter(|a| a.is_ok()).count();
+    println!(
+        "{:.3} ms each, {found_count} found",
+        1e3 * start_time.elapsed().as_secs_f64() / 560.0
+    );
 }
 
 /// The paper's machine with little damping and rubber stops to both sides and below, which it hits

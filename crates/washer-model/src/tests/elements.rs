@@ -231,7 +231,7 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
     }];
     let heights = heights_m(machine, 0.02, 2e-4, 9000);
     let is_extreme = |heights: &[f64]| (heights[1] - heights[0]) * (heights[2] - heights[1]) <= 0.0;
-    let extremes: Vec<f64> =
+    let extreme_heights_m: Vec<f64> =
         heights.windows(3).filter(|w| is_extreme(w)).map(|w| w[1].abs()).collect();
     // The energy lost from amplitude a to b is k (a^2 - b^2) / 2 = F (a - s) + F (b - s), without
     // the last term if it is negative.
@@ -243,8 +243,8 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
         if b > stroke_m { b } else { (2.0 * remaining_energy_j / stiffness_n_per_m).sqrt() }
     };
     let mut expected = 0.02;
-    assert!(extremes.len() > 12, "{}", extremes.len());
-    for (n, amplitude) in extremes.iter().enumerate() {
+    assert!(extreme_heights_m.len() > 12, "{}", extreme_heights_m.len());
+    for (n, amplitude) in extreme_heights_m.iter().enumerate() {
         expected = if expected > stroke_m { next_amplitude_m(expected) } else { expected };
         assert!(
             (amplitude - expected).abs() < 1e-5,
@@ -252,7 +252,7 @@ fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
         );
     }
     // The amplitude tends to the free stroke.
-    let last_extreme = extremes[extremes.len() - 1];
+    let last_extreme = extreme_heights_m[extreme_heights_m.len() - 1];
     assert!(last_extreme > stroke_m && last_extreme < 1.05 * stroke_m, "{last_extreme}");
 }
 
@@ -279,8 +279,9 @@ fn the_linear_model_uses_the_tangent_of_a_damper_within_its_free_stroke() {
     let [computed, expected] =
         [staged_machine, viscous_machine].map(|point| point.matrices(0.3, 20.0, 1.0));
     assert_eq!(computed.mass, expected.mass);
-    let pairs = [(computed.damping, expected.damping), (computed.stiffness, expected.stiffness)];
-    for (computed, expected) in pairs {
+    let matrix_pairs =
+        [(computed.damping, expected.damping), (computed.stiffness, expected.stiffness)];
+    for (computed, expected) in matrix_pairs {
         for (computed, expected) in computed.iter().flatten().zip(expected.iter().flatten()) {
             assert!(
                 (computed - expected).abs() <= 1e-9 * expected.abs().max(1.0),

@@ -144,11 +144,12 @@ fn accelerations_solve_the_expanded_equations() {
         let dx = instant.model.derivative(&instant.model.forcing(N(instant.t_s)), &x);
         let a: CoordinateVector = core::array::from_fn(|i| dx[COORDINATES + i].0);
         let [at_rest, slope] = instant.residual(&q, &u, &a);
-        let scale = instant.residual(&q, &u, &ZERO_VECTOR)[1];
-        let scale = (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + scale[i]).abs()));
+        let force_scale = instant.residual(&q, &u, &ZERO_VECTOR)[1];
+        let force_scale =
+            (0..COORDINATES).fold(0.0_f64, |m, i| m.max((at_rest[i] + force_scale[i]).abs()));
         for i in 0..COORDINATES {
             assert_eq!(dx[i].0, u[i]);
-            max_error = max_error.max((at_rest[i] + slope[i]).abs() / scale);
+            max_error = max_error.max((at_rest[i] + slope[i]).abs() / force_scale);
         }
     });
     eprintln!("M q'' + C q' + K q - F: at most {max_error:.1e} of the largest force");

@@ -14,11 +14,11 @@ use lane_ode::{Lane, N, Real, Simd};
 
 /// All recorders.
 pub(super) const ALL_RECORDERS: Recorders = Recorders {
-    root_mean_squares: true,
-    turns: true,
+    with_root_mean_squares: true,
+    with_turns: true,
     gauges: [true; Gauge::ALL.len()],
-    checkpoints: true,
-    snapshots: true,
+    with_checkpoints: true,
+    with_snapshots: true,
 };
 
 /// Returns the spin of the paper's Fig. 12.

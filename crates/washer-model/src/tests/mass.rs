@@ -69,7 +69,7 @@ fn accelerations_solve_the_equations_of_motion_of_any_machine() {
     assert!(max_error < 1e-12, "{max_error:e}");
 }
 
-/// Returns an arbitrary sag; mass scaling is correct for any sag.
+/// Returns an arbitrary sag. Mass scaling is correct for any sag.
 fn arbitrary_sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
     Sag { bearing_deflection: bearings, hinge_angles: [N(2e-4), N(-7e-4)] }

@@ -39,10 +39,10 @@ fn record_difference(a: &Record, b: &Record) -> f64 {
 fn the_additive_method_agrees_with_converged_rk4() {
     let point = prepare_point(2e8);
     for model in ModelKind::ALL {
-        let reference = simulate_point(model, &Method::rk4(5e-5), &point);
+        let reference_record = simulate_point(model, &Method::rk4(5e-5), &point);
         for (relative, max_error) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
             let record = simulate_point(model, &Method::additive(new_tolerance(relative)), &point);
-            let error = record_difference(&record, &reference);
+            let error = record_difference(&record, &reference_record);
             eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", record.accepted_steps);
             assert!(error < max_error, "{model:?} at {relative:e}: {error:e}");
         }
@@ -55,11 +55,11 @@ fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
     for model in ModelKind::ALL {
         // The bearings of the reference deflect by a tenth of a micrometre only, so that the almost
         // rigid bearings of the other points give a similar motion.
-        let reference = simulate_point(model, &Method::rk4(5e-5), &points[0]);
+        let reference_record = simulate_point(model, &Method::rk4(5e-5), &points[0]);
         for stiff_point in &points[1..] {
             assert!(simulate_point(model, &Method::rk4(5e-5), stiff_point).failure.is_some());
             let record = simulate_point(model, &Method::additive(new_tolerance(1e-4)), stiff_point);
-            let error = record_difference(&record, &reference);
+            let error = record_difference(&record, &reference_record);
             let attempted_steps = record.accepted_steps + record.rejected_steps;
             eprintln!("{model:?}: {error:.1e} in {attempted_steps} steps");
             assert!(error < 5e-4, "{model:?}: {error:e}");

@@ -7,9 +7,9 @@ use lane_ode::Cancel;
 
 /// Returns a random machine with the kinds of elements whose bits are set in `element_kinds`:
 /// friction, stops, stiffening springs, a bushing, a second unbalance.
-fn random_machine_with_elements(element_kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
-    let mut machine = random_machine(numbers);
-    let mut random_between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+fn random_machine_with_elements(element_kinds: u64, random_numbers: &mut fastrand::Rng) -> Machine {
+    let mut machine = random_machine(random_numbers);
+    let mut random_between = |low: f64, high: f64| low + (high - low) * random_numbers.f64();
     if element_kinds & 1 != 0 {
         for damper in &mut machine.dampers {
             damper.friction_n = random_between(5.0, 80.0);
@@ -67,29 +67,32 @@ fn turns_do_not_depend_on_other_lanes() {
     let number_from_env = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |text| text.parse().unwrap())
     };
-    let mut numbers = fastrand::Rng::with_seed(number_from_env("SEED", 1));
+    let mut random_numbers = fastrand::Rng::with_seed(number_from_env("SEED", 1));
     for number in 0..number_from_env("MACHINES", 64) {
         let element_kinds = number % 32;
-        let points: Vec<Point> = (0..1 + numbers.usize(..4))
+        let points: Vec<Point> = (0..1 + random_numbers.usize(..4))
             .map(|_| {
-                prepare_at_speed(random_machine_with_elements(element_kinds, &mut numbers), 100.0)
+                prepare_at_speed(
+                    random_machine_with_elements(element_kinds, &mut random_numbers),
+                    100.0,
+                )
             })
             .collect();
         let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
-        let speed_rpm = 60.0 + 400.0 * numbers.f64();
+        let speed_rpm = 60.0 + 400.0 * random_numbers.f64();
         let mut requests: Vec<TurnRequest<'_>> = Vec::new();
-        for _ in 0..2 + numbers.usize(..12) {
-            let settings = numbers.choice(&mut settings).unwrap();
-            let speed_rpm = speed_rpm * (1.0 + 0.02 * numbers.f64());
-            let setup = match numbers.u8(..3) {
+        for _ in 0..2 + random_numbers.usize(..12) {
+            let settings = random_numbers.choice(&mut settings).unwrap();
+            let speed_rpm = speed_rpm * (1.0 + 0.02 * random_numbers.f64());
+            let setup = match random_numbers.u8(..3) {
                 0 => settings.held_case(speed_rpm).unwrap().setup,
                 1 => settings.held_case(speed_rpm).unwrap().without_caps().unwrap().setup,
                 _ => settings.continuation_setup(speed_rpm).unwrap(),
             };
             let equilibrium = settings.point.equilibrium();
-            let deviation_size = 0.02 * numbers.f64();
+            let deviation_size = 0.02 * random_numbers.f64();
             let start_state = core::array::from_fn(|i| {
-                let offset = deviation_size * (2.0 * numbers.f64() - 1.0);
+                let offset = deviation_size * (2.0 * random_numbers.f64() - 1.0);
                 if i < 2 || (4..6).contains(&i) {
                     equilibrium[i] + offset
                 } else if i < COORDINATES {
@@ -98,7 +101,7 @@ fn turns_do_not_depend_on_other_lanes() {
                     offset
                 }
             });
-            requests.push(TurnRequest { setup, start_state, is_recorded: numbers.bool() });
+            requests.push(TurnRequest { setup, start_state, is_recorded: random_numbers.bool() });
         }
         let results = compute_turns(&requests, Cancel::Never);
         for (request, result) in requests.iter().zip(&results) {
