@@ -134,8 +134,8 @@ pub(crate) fn difference_of_levels(numbers: f64, separation: Separation) -> f64 
 /// Returns the error of a level from its difference from the level before, and from another
 /// difference: that level's own one divided by its contraction, or for a chaotic trajectory that of
 /// the perturbed run. `None` if the error is not a finite number.
-pub(crate) fn error_of_level(difference: f64, other_difference: f64) -> Option<f64> {
-    let error = SAFETY_FACTOR * difference.max(other_difference);
+pub(crate) fn error_of_level(difference: f64, contracted_difference: f64) -> Option<f64> {
+    let error = SAFETY_FACTOR * difference.max(contracted_difference);
     error.is_finite().then_some(error)
 }
 
@@ -170,8 +170,8 @@ pub fn refinement_levels(
             step_s /= ratio;
         }
     }
-    let following_s = push_uncapped(&mut levels, Method::rk4, [first_s, ratio]);
-    push_resolving(&mut levels, steps, model, following_s);
+    let following_s = push_uncapped_levels(&mut levels, Method::rk4, [first_s, ratio]);
+    push_resolving_levels(&mut levels, steps, model, following_s);
     RefinementLevels::checked(levels, None)
 }
 
@@ -198,12 +198,12 @@ fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevel
         let longest_step_s = Some(longest_s);
         levels.push(Method::dop853_adaptive(Tolerance { longest_step_s, ..tolerance(level) }));
     }
-    push_resolving(&mut levels, steps, ModelKind::Nonlinear, longest_s);
-    RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
+    push_resolving_levels(&mut levels, steps, ModelKind::Nonlinear, longest_s);
+    RefinementLevels::checked(levels, Some(UNCAPPED_REASON.to_owned()))
 }
 
 /// Adds the levels whose steps resolve the bearings' modes.
-fn push_resolving(
+fn push_resolving_levels(
     levels: &mut Vec<Method>,
     steps: &StepSelector<'_>,
     model: ModelKind,
@@ -213,17 +213,17 @@ fn push_resolving(
         ModelKind::Nonlinear => (Formula::Dop853, Method::dop853, RESOLVING_RAD[0]),
         ModelKind::Linear => (Formula::Rk4, Method::rk4, RESOLVING_RAD[1]),
     };
-    let resolving_s = match steps.plain_step_s(formula) {
+    let resolving_step_s = match steps.plain_step_s(formula) {
         Some(stable_s) => stable_s * resolving_rad / formula.limit(),
         None => longest_s,
     };
-    let first_s = resolving_s.min(longest_s);
-    push_uncapped(levels, method, [first_s, step_ratio(CAPPED_ORDER)]);
+    let first_s = resolving_step_s.min(longest_s);
+    push_uncapped_levels(levels, method, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
 /// Adds levels without capped modes in fixed steps, the first with a step of `first_s`, each other
 /// with the step before divided by `ratio`. Returns the step after the last.
-fn push_uncapped(
+fn push_uncapped_levels(
     levels: &mut Vec<Method>,
     method: fn(f64) -> Method,
     [first_s, ratio]: [f64; 2],
@@ -237,7 +237,7 @@ fn push_uncapped(
 }
 
 /// The reason why a machine with friction or stops has no levels with capped modes.
-const AT_CORNERS: &str =
+const UNCAPPED_REASON: &str =
     "no modes are capped, because friction and stops give forces corners, which shake the hinge";
 
 #[cfg(test)]

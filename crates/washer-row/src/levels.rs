@@ -98,7 +98,7 @@ impl RefinementLevels {
     /// Returns the method of the given capped kind; if the model lacks it, of the finest coarser
     /// capped kind.
     pub fn capped_method(&self, kind: MethodKind) -> Option<Method> {
-        let is_within = |method: &&Method| method.kind.is_capped() && method.kind <= kind;
-        self.levels.iter().rfind(is_within).copied()
+        let is_coarse_enough = |method: &&Method| method.kind.is_capped() && method.kind <= kind;
+        self.levels.iter().rfind(is_coarse_enough).copied()
     }
 }

@@ -109,8 +109,8 @@ impl Metric {
 /// Returns the name of a column from quantity, model and unit, without those that are empty.
 fn column(quantity: &str, model: &str, unit: &str) -> String {
     let unit = unit.to_lowercase().replace("1/", "per_").replace('/', "_per_");
-    let words = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
-    words.collect::<Vec<_>>().join("_")
+    let name_parts = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
+    name_parts.collect::<Vec<_>>().join("_")
 }
 
 /// A metric's column, which each model has: of the whole machine, or of one stop, foot or damper.
@@ -185,17 +185,17 @@ impl Measures {
     /// Returns the columns of a metric: first that of all parts together, then one for each part if
     /// there are several.
     pub fn metric_columns(&self, metric: Metric) -> impl Iterator<Item = MetricColumn> + use<> {
-        let parts = match metric.properties().part_column.and(metric.properties().part) {
+        let part_count = match metric.properties().part_column.and(metric.properties().part) {
             Some(PartKind::Stop) => self.stops,
             Some(PartKind::Foot) => self.feet,
             Some(PartKind::Damper) => self.dampers,
             None => 0,
         };
-        let numbered_parts = if parts > 1 { 0..parts } else { 0..0 };
-        let common_column = MetricColumn { metric, part: None };
+        let numbered_parts = if part_count > 1 { 0..part_count } else { 0..0 };
+        let machine_column = MetricColumn { metric, part: None };
         let part_columns =
             numbered_parts.map(move |part| MetricColumn { metric, part: Some(part) });
-        std::iter::once(common_column).chain(part_columns)
+        std::iter::once(machine_column).chain(part_columns)
     }
 
     /// Returns the recorders that the measures need.
@@ -219,19 +219,20 @@ impl Outcome {
 
     /// Computes [`Outcome::turn_ratios`] from the turns of both models, if both have turns.
     fn compare_turns(&mut self, channels: &[Channel]) {
-        let nonlinear = &self.nonlinear.turns;
-        let linear = &self.linear.turns;
+        let nonlinear_turns = &self.nonlinear.turns;
+        let linear_turns = &self.linear.turns;
         self.turn_ratios.clear();
-        if nonlinear.is_empty() || linear.is_empty() {
+        if nonlinear_turns.is_empty() || linear_turns.is_empty() {
             return;
         }
         self.turn_ratios.extend(channels.iter().map(|channel| {
             let i = channel.index();
-            let has_motion = linear.iter().any(|turn| turn[i] != 0.0);
+            let has_motion = linear_turns.iter().any(|turn| turn[i] != 0.0);
             let ratio = |(nonlinear, linear): (&Deviations, &Deviations)| {
                 nonlinear[i].max(TURN_FLOOR) / linear[i].max(TURN_FLOOR)
             };
-            has_motion.then(|| nonlinear.iter().zip(linear).map(ratio).fold(0.0, f64::max))
+            has_motion
+                .then(|| nonlinear_turns.iter().zip(linear_turns).map(ratio).fold(0.0, f64::max))
         }));
     }
 }
@@ -331,9 +332,9 @@ mod tests {
     #[test]
     fn only_metrics_of_trajectories_need_recorders() {
         assert_eq!(Measures::default().recorders(), Recorders::default());
-        let sag = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
+        let sag_measures = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
         assert_eq!(
-            sag.recorders(),
+            sag_measures.recorders(),
             Recorders::default(),
             "the equilibrium is known without a trajectory"
         );

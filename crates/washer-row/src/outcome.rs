@@ -73,14 +73,14 @@ const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
 /// time of failure.
 fn row_status(nonlinear: &Trajectory, linear: &Trajectory) -> (usize, Option<f64>) {
     // The statuses that apply only to a whole row follow those with the prefix.
-    let code = |status: Status, linear_offset: usize| match status as usize {
+    let to_row_status = |status: Status, linear_offset: usize| match status as usize {
         code if code < MODEL_STATUSES => code + linear_offset,
         code => code + MODEL_STATUSES - 1,
     };
     if nonlinear.status != Status::Ok {
-        (code(nonlinear.status, 0), nonlinear.fail_time_s)
+        (to_row_status(nonlinear.status, 0), nonlinear.fail_time_s)
     } else if linear.status != Status::Ok {
-        (code(linear.status, MODEL_STATUSES - 1), linear.fail_time_s)
+        (to_row_status(linear.status, MODEL_STATUSES - 1), linear.fail_time_s)
     } else {
         (0, None)
     }
@@ -152,11 +152,11 @@ pub struct GrowingMode {
 impl From<&Response> for Growth {
     fn from(response: &Response) -> Self {
         let mode = |rank: usize| {
-            let participant = response.participating_modes.get(rank)?;
+            let participating_mode = response.participating_modes.get(rank)?;
             Some(GrowingMode {
-                number: participant.mode as u32,
-                name: participant.motion.name_index() as u32,
-                frequency_cpm: participant.frequency_cpm,
+                number: participating_mode.mode as u32,
+                name: participating_mode.motion.name_index() as u32,
+                frequency_cpm: participating_mode.frequency_cpm,
             })
         };
         Self {
@@ -200,12 +200,12 @@ impl DwellPeaks {
                 .filter(move |motion| !is_transient(motion))
                 .map(move |motion| (speed_rpm, motion))
         });
-        let mut max_rotation_rad = 0.0;
+        let mut greatest_rotation_rad = 0.0;
         attractors.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
             let candidate = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind_index() };
             let mut peaks = peaks.unwrap_or(candidate);
-            if candidate.tub_rotation_rad() > max_rotation_rad {
-                max_rotation_rad = candidate.tub_rotation_rad();
+            if candidate.tub_rotation_rad() > greatest_rotation_rad {
+                greatest_rotation_rad = candidate.tub_rotation_rad();
                 peaks = Self { deviations: peaks.deviations, ..candidate };
             }
             for (peak, deviation) in peaks.deviations.iter_mut().zip(motion.peaks) {

@@ -104,14 +104,14 @@ struct ModelRefinement {
     /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
     /// The comparison with a perturbed run, once it has run.
-    perturbed: Option<PerturbedComparison>,
+    perturbed_comparison: Option<PerturbedComparison>,
 }
 
 /// The difference of a level from the one before.
 #[derive(Clone, Copy, Debug)]
 struct LevelDifference {
     /// The relative difference of the numbers; `None` if the levels cannot be compared.
-    numbers: Option<f64>,
+    difference_of_numbers: Option<f64>,
     /// The separation of the motions.
     separation: Separation,
     /// The change by which the level starts a family.
@@ -122,7 +122,7 @@ impl LevelDifference {
     /// Returns the relative difference of the levels: that of the numbers, or the distance of the
     /// motions if the levels follow different ones. `None` if the levels cannot be compared.
     fn relative(self) -> Option<f64> {
-        Some(difference_of_levels(self.numbers?, self.separation))
+        Some(difference_of_levels(self.difference_of_numbers?, self.separation))
     }
 
     /// Returns the difference divided by the contraction of the error from this level to the
@@ -163,12 +163,13 @@ impl ModelRefinement {
         };
         if rule.levels.is_perturbed(level) {
             let is_chaotic = separation.is_exponential();
-            self.perturbed = Some(PerturbedComparison { is_chaotic, difference });
+            self.perturbed_comparison = Some(PerturbedComparison { is_chaotic, difference });
             self.run = Some(previous_run);
             return;
         }
         let start = rule.levels.family_start(level);
-        let level_difference = LevelDifference { numbers: difference, separation, start };
+        let level_difference =
+            LevelDifference { difference_of_numbers: difference, separation, start };
         self.differences.push(level_difference);
         if self.differences.len() == 1 && self.level == 0 {
             self.first_difference = level_difference.relative().unwrap_or(f64::INFINITY);
@@ -183,7 +184,7 @@ impl ModelRefinement {
     }
 
     fn is_chaotic(&self) -> bool {
-        self.perturbed.is_some_and(|perturbed| perturbed.is_chaotic)
+        self.perturbed_comparison.is_some_and(|comparison| comparison.is_chaotic)
     }
 
     fn has_failed(&self) -> bool {
@@ -192,8 +193,10 @@ impl ModelRefinement {
 
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
-        if let Some(PerturbedComparison { is_chaotic: true, difference }) = self.perturbed {
-            return error_of_level(self.differences.last()?.numbers?, difference?);
+        if let Some(PerturbedComparison { is_chaotic: true, difference }) =
+            self.perturbed_comparison
+        {
+            return error_of_level(self.differences.last()?.difference_of_numbers?, difference?);
         }
         let kind = rule.levels.levels[self.level].kind;
         let contracted_difference = match self.differences[..] {
@@ -229,17 +232,17 @@ impl ModelRefinement {
             // differ by more than a perturbed run does. A perturbed run tells such a motion from
             // one that needs finer steps.
             let may_be_chaos = !is_converged && self.is_separated();
-            let needs_perturbed_run = may_be_chaos && self.perturbed.is_none();
+            let needs_perturbed_run = may_be_chaos && self.perturbed_comparison.is_none();
             return needs_perturbed_run.then(|| levels.perturbed_index(self.level));
         }
-        let mut next = self.level + 1;
+        let mut first_candidate = self.level + 1;
         // Capped modes may be the cause of the failure.
         if self.has_failed() {
-            next = next.max(levels.first_uncapped());
+            first_candidate = first_candidate.max(levels.first_uncapped());
         }
         // Levels with the same unresolved ringing have the same error from it, which their
         // difference does not show.
-        (next..levels.levels.len()).find(has_little_ringing)
+        (first_candidate..levels.levels.len()).find(has_little_ringing)
     }
 }
 

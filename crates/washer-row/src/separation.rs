@@ -36,10 +36,10 @@ impl Separation {
     /// Determines the separation from a list of instants (s) and distances (relative to the
     /// motion).
     pub(crate) fn new(distances: &[(f64, f64)]) -> Self {
-        let separated = distances.iter().filter(|(_, distance)| *distance > 0.0);
+        let separated_samples = distances.iter().filter(|(_, distance)| *distance > 0.0);
         let mut least_sample: Option<(f64, f64)> = None;
         let mut separation = Self::default();
-        for &(time_s, distance) in separated {
+        for &(time_s, distance) in separated_samples {
             let (least_s, least_distance) = *least_sample.get_or_insert((time_s, distance));
             if distance <= least_distance {
                 least_sample = Some((time_s, distance));
@@ -99,8 +99,8 @@ mod tests {
         let instability_band =
             separation(|time_s| 1e-9 + 1e-3 * (-(time_s - 16.0) * (time_s - 16.0)).exp());
         assert!(!instability_band.is_exponential(), "{instability_band:?}");
-        let drift = separation(|time_s| 0.01 * time_s);
-        assert!(!drift.is_exponential(), "{drift:?}");
+        let drifting_separation = separation(|time_s| 0.01 * time_s);
+        assert!(!drifting_separation.is_exponential(), "{drifting_separation:?}");
         assert!(!separation(|_| 0.0).is_exponential());
     }
 }
