@@ -293,13 +293,13 @@ impl LinearCoefficients {
         let constants = &self.constants;
         let (inertia, entries) = self.rotor_coefficients.evaluate(&harmonics::spin_functions(spin));
         let tub = MassCentreMap {
-            midpoint: [TUB_Y, TUB_Z],
-            rotations: TUB_ROTATIONS,
+            midpoint_coordinates: [TUB_Y, TUB_Z],
+            rotation_coordinates: TUB_ROTATIONS,
             arm: constants.tub_arm,
         };
         let rotor = MassCentreMap {
-            midpoint: [SHAFT_Y, SHAFT_Z],
-            rotations: ROTOR_ROTATIONS,
+            midpoint_coordinates: [SHAFT_Y, SHAFT_Z],
+            rotation_coordinates: ROTOR_ROTATIONS,
             arm: rotor_terms::arms(&entries),
         };
         let mut matrices = Matrices {
@@ -342,8 +342,8 @@ impl LinearCoefficients {
 
 /// The map between a half's mass centre and the coordinates.
 struct MassCentreMap<const R: usize> {
-    midpoint: [usize; 2],
-    rotations: [usize; R],
+    midpoint_coordinates: [usize; 2],
+    rotation_coordinates: [usize; R],
     arm: [[N<f64>; 2]; R],
 }
 
@@ -354,10 +354,10 @@ impl<const R: usize> MassCentreMap<R> {
         let mut forces = [0.0; COORDINATES];
         let force = [rows(0), rows(1)];
         for i in 0..2 {
-            forces[self.midpoint[i]] = force[i].0;
+            forces[self.midpoint_coordinates[i]] = force[i].0;
         }
         for (r, [y, z]) in self.arm.into_iter().enumerate() {
-            forces[self.rotations[r]] = (rows(2 + r) + y * force[0] + z * force[1]).0;
+            forces[self.rotation_coordinates[r]] = (rows(2 + r) + y * force[0] + z * force[1]).0;
         }
         forces
     }
@@ -371,8 +371,8 @@ impl<const R: usize> MassCentreMap<R> {
     ) {
         let mass_kg = 1.0 / inverse_mass.0;
         let arm = &self.arm;
-        let rotations = &self.rotations;
-        for (i, midpoint) in self.midpoint.into_iter().enumerate() {
+        let rotations = &self.rotation_coordinates;
+        for (i, midpoint) in self.midpoint_coordinates.into_iter().enumerate() {
             mass[midpoint][midpoint] = mass_kg;
             for r in 0..R {
                 mass[midpoint][rotations[r]] = mass_kg * arm[r][i].0;

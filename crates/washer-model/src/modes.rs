@@ -22,7 +22,7 @@ const HINGE_COORDINATES: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
 
 /// The number of angles over a turn at which the highest frequency is computed. Basis: M and K have
 /// harmonics 0 to 2 of theta, for which eight angles suffice. Doubling it doubles the time.
-const ANGLES: usize = 8;
+const ANGLE_COUNT: usize = 8;
 
 /// A failure to compute the modes of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -280,7 +280,7 @@ pub(crate) fn highest_capped_frequency_rad_per_s(
     let mut highest_rad_per_s = 0.0_f64;
     let steepest_model = point.steepest_model.as_deref().filter(|_| model == ModelKind::Nonlinear);
     let models = core::iter::once(&point.linear_coefficients).chain(steepest_model);
-    let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
+    let angles = (0..ANGLE_COUNT).map(|angle| TAU * angle as f64 / ANGLE_COUNT as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
         let system = first_order_system(point, model, theta, speed_rad_per_s, caps)?;
         for s in system.matrix.eigenvalues().map_err(|_| ModesError::Eigenvalues)? {

@@ -28,7 +28,7 @@ const SPEED_TOLERANCE: f64 = 5e-3;
 /// The greatest number of linear runs. Basis: three or four are usual, and 38 were needed between
 /// a damper that sticks and one that slides. Doubling it costs time for points without a fixed
 /// point.
-pub(crate) const MAX_RUNS: usize = 48;
+pub(crate) const MAX_LINEAR_RUNS: usize = 48;
 
 /// The product of step and frequency of the fastest mode in the first runs (rad). Basis: it gives
 /// speeds within a percent. Doubling it gives errors 16 times as large.
@@ -275,7 +275,7 @@ pub fn prepare(
     let mut point_searches: Vec<PointSearch> =
         prepared_points.iter().enumerate().filter_map(to_point_search).collect();
     let recorders = Recorders::with_gauge(Gauge::DamperSpeed);
-    for _ in 0..MAX_RUNS {
+    for _ in 0..MAX_LINEAR_RUNS {
         let mut unfinished_searches: Vec<&mut PointSearch> =
             point_searches.iter_mut().filter(|point_search| !point_search.is_finished).collect();
         unfinished_searches.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));

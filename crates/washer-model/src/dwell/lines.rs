@@ -9,11 +9,11 @@ const TRIALS_PER_SAMPLE: usize = 2;
 
 /// Number of frequencies that are computed side by side. Basis: the lanes of the widest vectors.
 /// Doubling it changes the time only.
-const FREQUENCIES_AT_ONCE: usize = 8;
+const FREQUENCIES_PER_PASS: usize = 8;
 
 /// Number of rounds of the ternary search for a line's frequency. Basis: 1e-7 of the first
 /// interval. Doubling it reaches rounding.
-const TERNARY_ROUNDS: usize = 40;
+const TERNARY_SEARCH_ROUNDS: usize = 40;
 
 /// Number of harmonics of a line that are subtracted from a signal. Doubling it reduces the
 /// residual of curves with sharp bends.
@@ -107,9 +107,10 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     let trials: Vec<usize> =
         (2 * TRIALS_PER_SAMPLE * 2..=TRIALS_PER_SAMPLE * sample_count).collect();
     let mut strongest_power_and_trial = (0.0, *trials.first()?);
-    for trials in trials.chunks(FREQUENCIES_AT_ONCE) {
-        let frequencies =
-            from_fn::<_, FREQUENCIES_AT_ONCE, _>(|k| frequency_at(trials[k.min(trials.len() - 1)]));
+    for trials in trials.chunks(FREQUENCIES_PER_PASS) {
+        let frequencies = from_fn::<_, FREQUENCIES_PER_PASS, _>(|k| {
+            frequency_at(trials[k.min(trials.len() - 1)])
+        });
         let frequency_powers = signal_powers(&residuals, &hann_weights, frequencies);
         let trial_powers = frequency_powers.into_iter().zip(trials.iter().copied());
         strongest_power_and_trial =
@@ -124,7 +125,7 @@ pub(super) fn find_strongest_line(signals: &[Vec<f64>]) -> Option<SpectralLine> 
     let (_, strongest_trial) = strongest_power_and_trial;
     let mut min_frequency = frequency_at(strongest_trial - 1);
     let mut max_frequency = frequency_at(strongest_trial + 1).min(0.5);
-    for _ in 0..TERNARY_ROUNDS {
+    for _ in 0..TERNARY_SEARCH_ROUNDS {
         let third_of_interval = (max_frequency - min_frequency) / 3.0;
         let [lower_power, upper_power] = signal_powers(
             &residuals,

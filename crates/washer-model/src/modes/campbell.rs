@@ -16,17 +16,17 @@ use lane_ode::Cancel;
 /// over harmonics 1 and 2 of theta; with 36 the errors of the least and of the greatest frequency
 /// are below 1 - cos(pi / 36), or 0.4 %, of the variation. Doubling it reduces these errors to 0.1
 /// %.
-const ANGLES: usize = 36;
+const ANGLE_COUNT: usize = 36;
 
 /// The least MAC at which two shapes count as those of one mode. Basis: the usual threshold of
 /// modal analysis. With twice this value, which no MAC reaches, every interval would be halved to
 /// the limit.
-const MIN_ASSURANCE: f64 = 0.9;
+const MIN_MODAL_ASSURANCE: f64 = 0.9;
 
 /// The greatest number of halvings of an interval. Basis: the two modes of a shaft without a
 /// preferred direction are indistinguishable in intervals of any length. Doubling it takes up to 64
 /// times as long for such modes.
-const MAX_HALVINGS: u32 = 6;
+const MAX_INTERVAL_HALVINGS: u32 = 6;
 
 /// The tolerance of a resonance speed (rpm). Basis: far below any printed digit. Doubling it saves
 /// less than a step.
@@ -161,22 +161,22 @@ fn follow_modes(
         end_speed_or_theta,
         modes_at,
         modes_at(end_speed_or_theta)?,
-        MAX_HALVINGS,
+        MAX_INTERVAL_HALVINGS,
     )
 }
 
 /// Returns the modes `end_modes` in the order of the modes `start_modes`, and halves the interval
-/// at most `halvings_left` times.
+/// at most `remaining_halvings` times.
 fn follow_halving(
     start_modes: &Modes,
     start_speed_or_theta: f64,
     end_speed_or_theta: f64,
     modes_at: &dyn Fn(f64) -> Result<Modes, ModesError>,
     end_modes: Modes,
-    halvings_left: u32,
+    remaining_halvings: u32,
 ) -> Result<Modes, ModesError> {
     let (mode_order, assurance) = match_modes(start_modes, &end_modes);
-    if assurance >= MIN_ASSURANCE || halvings_left == 0 {
+    if assurance >= MIN_MODAL_ASSURANCE || remaining_halvings == 0 {
         return Ok(Modes { modes: mode_order.map(|k| end_modes.modes[k]), ..end_modes });
     }
     let midpoint = 0.5 * (start_speed_or_theta + end_speed_or_theta);
@@ -186,7 +186,7 @@ fn follow_halving(
         midpoint,
         modes_at,
         modes_at(midpoint)?,
-        halvings_left - 1,
+        remaining_halvings - 1,
     )?;
     follow_halving(
         &midpoint_modes,
@@ -194,7 +194,7 @@ fn follow_halving(
         end_speed_or_theta,
         modes_at,
         end_modes,
-        halvings_left - 1,
+        remaining_halvings - 1,
     )
 }
 
@@ -227,8 +227,8 @@ fn average_over_turn(
 ) -> Result<[ModeAtSpeed; COORDINATES], ModesError> {
     let speed_rad_per_s = to_rad_per_s(speed_rpm);
     let mut modes_by_angle = vec![start_modes.clone()];
-    for k in 1..ANGLES {
-        let angle_rad = |k: usize| TAU * k as f64 / ANGLES as f64;
+    for k in 1..ANGLE_COUNT {
+        let angle_rad = |k: usize| TAU * k as f64 / ANGLE_COUNT as f64;
         let modes_at = |angle_rad| modes(point, angle_rad, speed_rad_per_s);
         modes_by_angle.push(follow_modes(
             &modes_by_angle[k - 1],
@@ -240,8 +240,9 @@ fn average_over_turn(
     let to_rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
         let turn_modes = modes_by_angle.iter().map(|modes| &modes.modes[mode]);
-        let mean_over_turn =
-            |value: fn(&Mode) -> f64| turn_modes.clone().map(value).sum::<f64>() / ANGLES as f64;
+        let mean_over_turn = |value: fn(&Mode) -> f64| {
+            turn_modes.clone().map(value).sum::<f64>() / ANGLE_COUNT as f64
+        };
         let frequencies_rad_per_s = turn_modes.clone().map(|mode| mode.im_rad_per_s);
         let re_per_s = mean_over_turn(|mode| mode.re_per_s);
         let im_rad_per_s = mean_over_turn(|mode| mode.im_rad_per_s);

@@ -363,8 +363,8 @@ impl<T: Real> StopCoefficients<T> {
         self.force_at_depth(self.depth(point), self.speed(point))
     }
 
-    /// Computes the motion of the tub point along the stop's direction. In tub axes the tub point is
-    /// fixed, so that only the direction is rotated.
+    /// Computes the motion of the tub point along the stop's direction. In tub axes the tub point
+    /// is fixed, so that only the direction is rotated.
     #[inline(always)]
     fn motion(&self, tub: &TubMotion<T>) -> StopMotion<T> {
         let direction = tub.tilt.rotate_to_frame(&self.direction);

@@ -24,7 +24,7 @@ const STEP_PHASE_RAD: f64 = 0.1;
 const MIN_MULTIPLIER: f64 = 1e-5;
 
 /// The least number of steps of a turn. Doubling it doubles the time at high speeds.
-const MIN_STEPS: f64 = 100.0;
+const MIN_STEPS_PER_TURN: f64 = 100.0;
 
 /// A Floquet mode of the linear model, and the mode with theta frozen that is most similar to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,8 @@ pub fn floquet_modes(point: &Point, speed_rpm: f64) -> Result<Vec<FloquetMode>, 
     let speed_rad_per_s = speed_rpm * TAU / 60.0;
     let highest_rad_per_s = highest_frequency_rad_per_s(point, speed_rad_per_s)
         .map_err(|_| ResponseError::NoEigenvalues)?;
-    let step_count = (highest_rad_per_s * 60.0 / speed_rpm / STEP_PHASE_RAD).ceil().max(MIN_STEPS);
+    let step_count =
+        (highest_rad_per_s * 60.0 / speed_rpm / STEP_PHASE_RAD).ceil().max(MIN_STEPS_PER_TURN);
     let setup = TurnSetup {
         point,
         speed_rpm,

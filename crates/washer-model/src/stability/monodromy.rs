@@ -42,12 +42,12 @@ const WIDE_VECTORS_PER_BLOCK: usize = STATES.div_ceil(MAX_LANES);
 
 /// The number of steps whose derivatives are interpolated at once. Basis: every number of steps is
 /// a multiple of it. Doubling it needs twice the memory.
-const STEPS_AT_ONCE: usize = 8;
+const STEPS_PER_BLOCK: usize = 8;
 
-/// The number of starts, middles and ends of [`STEPS_AT_ONCE`] steps. If forces have corners, these
-/// steps are so short that the smooth derivatives are interpolated by parabolas through the first,
-/// the middle and the last instant.
-const INSTANTS_AT_ONCE: usize = 2 * STEPS_AT_ONCE + 1;
+/// The number of starts, middles and ends of [`STEPS_PER_BLOCK`] steps. If forces have corners,
+/// these steps are so short that the smooth derivatives are interpolated by parabolas through the
+/// first, the middle and the last instant.
+const INSTANTS_PER_BLOCK: usize = 2 * STEPS_PER_BLOCK + 1;
 
 /// The computation of the monodromy matrices of several turns, whose set-ups differ in points and
 /// speeds only.
@@ -166,15 +166,15 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                 columns[j / T::LANES][j].0.set(j % T::LANES, 1.0);
             }
         }
-        let mut coefficients = vec![SmoothCoefficients::ZERO; INSTANTS_AT_ONCE];
+        let mut coefficients = vec![SmoothCoefficients::ZERO; INSTANTS_PER_BLOCK];
         let mut endpoints_and_middle = [SmoothCoefficients::ZERO; 3];
-        let mut parabola_weights = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_AT_ONCE];
-        for k in 0..INSTANTS_AT_ONCE {
-            let t = k as f64 / STEPS_AT_ONCE as f64 - 1.0;
+        let mut parabola_weights = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_PER_BLOCK];
+        for k in 0..INSTANTS_PER_BLOCK {
+            let t = k as f64 / STEPS_PER_BLOCK as f64 - 1.0;
             let lagrange_weights = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
             parabola_weights[k][..lagrange_weights.len()].copy_from_slice(&lagrange_weights);
         }
-        for first_step in (0..self.grid.step_count).step_by(STEPS_AT_ONCE) {
+        for first_step in (0..self.grid.step_count).step_by(STEPS_PER_BLOCK) {
             for (turn, columns) in columns.iter_mut().enumerate() {
                 if self.corner_forces.is_empty() {
                     interpolate(&samples[turn], weights, 2 * first_step, &mut coefficients);
@@ -185,7 +185,7 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                         &parabola_weights,
                         &mut coefficients,
                     );
-                    for k in 0..INSTANTS_AT_ONCE {
+                    for k in 0..INSTANTS_PER_BLOCK {
                         self.add_corner_derivatives(
                             turn,
                             2 * first_step + k,
@@ -195,7 +195,7 @@ impl<T: Lane> OutOfLine for SmoothMonodromy<'_, T> {
                     }
                 }
                 let step_s = zero.lit(self.grid.step_s.0.get(turn));
-                for k in 0..STEPS_AT_ONCE {
+                for k in 0..STEPS_PER_BLOCK {
                     let start_derivatives = &coefficients[2 * k].derivatives;
                     let middle_derivatives = &coefficients[2 * k + 1].derivatives;
                     let end_derivatives = &coefficients[2 * k + 2].derivatives;
@@ -358,7 +358,7 @@ pub(super) fn interpolation_weights(step_count: usize, instant_count: usize) -> 
 }
 
 /// Interpolates the samples of a turn at `coefficients.len()` equally spaced instants out of the
-/// [`INSTANTS_AT_ONCE`] half steps from `first_instant` on.
+/// [`INSTANTS_PER_BLOCK`] half steps from `first_instant` on.
 #[inline(always)]
 fn interpolate(
     samples: &[SmoothCoefficients],
@@ -366,9 +366,9 @@ fn interpolate(
     first_instant: usize,
     coefficients: &mut [SmoothCoefficients],
 ) {
-    let mut weights_by_sample = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_AT_ONCE];
+    let mut weights_by_sample = [[0.0; INSTANTS_PER_TURN_WITH_CORNERS]; INSTANTS_PER_BLOCK];
     let weights_by_sample = &mut weights_by_sample[..coefficients.len()];
-    let instant_stride = (INSTANTS_AT_ONCE - 1) / (coefficients.len() - 1);
+    let instant_stride = (INSTANTS_PER_BLOCK - 1) / (coefficients.len() - 1);
     for (k, weights_by_sample) in weights_by_sample.iter_mut().enumerate() {
         let instant_index = first_instant + k * instant_stride;
         let first_sample = instant_index / weights.len();

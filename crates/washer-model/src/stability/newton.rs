@@ -44,7 +44,7 @@ pub(super) fn run_searches<'a, S: PeriodMapSearch<'a>>(
 
 /// The greatest number of turns of a search for a response. Doubling it doubles the time of
 /// searches that fail.
-const MAX_TURNS: usize = 80;
+const MAX_SEARCH_TURNS: usize = 80;
 
 /// The expected relative residual below which the next turn is the last one of a search. Basis: a
 /// hundredth of [`RESPONSE_TOLERANCE`]. Doubling it saves few turns.
@@ -285,7 +285,7 @@ impl<'a> PeriodMapSearch<'a> for NewtonSearch<'a> {
             None if residual > MAX_RESIDUAL_RATIO * self.residual => self.factors = None,
             None => {}
         }
-        self.is_over |= !residual.is_finite() || self.turn_count == MAX_TURNS;
+        self.is_over |= !residual.is_finite() || self.turn_count == MAX_SEARCH_TURNS;
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
             let defect = core::array::from_fn(|i| N(end_state[i] - self.state[i]));
             let correction = factors.solve(&defect);

@@ -14,7 +14,7 @@ use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared_distance;
 use crate::point::Point;
-use crate::preparation::{MAX_RUNS, SpeedAmplitudeSearch, select_motion_speeds};
+use crate::preparation::{MAX_LINEAR_RUNS, SpeedAmplitudeSearch, select_motion_speeds};
 use crate::run::active_recorders::{ActiveRecorders, ObservedState};
 use crate::run::all_lanes;
 use crate::run::model::{LaneModel, LinearModel, NonlinearModel};
@@ -350,7 +350,7 @@ pub(super) fn linear_responses_with_motion_friction(
     };
     let mut unfinished_searches: Vec<(usize, SpeedAmplitudeSearch)> =
         setups.iter().enumerate().filter_map(new_search).collect();
-    for _ in 0..MAX_RUNS {
+    for _ in 0..MAX_LINEAR_RUNS {
         let point_at_speeds = |(k, search): &(usize, SpeedAmplitudeSearch)| {
             setups[*k].point.with_motion_friction_speeds(&search.speeds_m_per_s())
         };

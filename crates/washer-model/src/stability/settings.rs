@@ -15,12 +15,12 @@ use std::sync::Arc;
 
 /// The factor by which the number of steps grows if caps shift modes too far. Doubling it may take
 /// up to twice as many steps as needed.
-const STEP_COUNT_INCREASE: f64 = 1.5;
+const STEP_COUNT_INCREASE_FACTOR: f64 = 1.5;
 
 /// The assumed share of a motion that does not rotate with the drum. Only this share has the
 /// frequency error of a capped hinge. Basis: the law of the capped hinge is exact for motion that
 /// turns with the drum, which most motion does. Doubling it takes more steps.
-const FREE_MOTION_SHARE: f64 = 0.1;
+const NON_ROTATING_MOTION_SHARE: f64 = 0.1;
 
 /// The product of step and frequency of the fastest mode (rad), if none is capped. Doubling it
 /// makes errors of that mode 16 times as large.
@@ -105,7 +105,7 @@ const HIGHEST_SPEED_RATIO: f64 = 2.0;
 
 /// The greatest number of steps of a turn. Basis: a drum that needs more is so slow that the
 /// machine follows its unbalance statically. Doubling it allows half the speed.
-const MAX_STEPS: usize = 1 << 15;
+const MAX_STEPS_PER_TURN: usize = 1 << 15;
 
 /// The number of speed ranges in an octave, in each of which steps and caps are chosen once.
 /// Doubling it chooses them twice as often, and closer to their limits.
@@ -163,7 +163,7 @@ fn max_instants(point: &Point) -> usize {
 fn round_up_steps(point: &Point, step_count: f64) -> Result<usize, ResponseError> {
     let divisor = max_instants(point) as f64;
     let step_count = divisor * (step_count / divisor).ceil().max(1.0);
-    if step_count > MAX_STEPS as f64 {
+    if step_count > MAX_STEPS_PER_TURN as f64 {
         Err(ResponseError::TooSlow)
     } else {
         Ok(step_count as usize)
@@ -396,7 +396,8 @@ impl<'a> Settings<'a> {
                 is_capped =
                     compute_shift_per_s(0)?.max(compute_shift_per_s(1)?) <= limits.max_shift_per_s;
                 if !is_capped {
-                    step_count = round_up_steps(point, STEP_COUNT_INCREASE * step_count as f64)?;
+                    step_count =
+                        round_up_steps(point, STEP_COUNT_INCREASE_FACTOR * step_count as f64)?;
                 }
             }
         }
@@ -424,7 +425,11 @@ fn hinge_shift(
         .abs()
         + (1.0 - BACKWARD_WHIRL_RATIO) * frequency_rad_per_s * speed_rad_per_s;
     let cap_ratio = shift_rad2_per_s2 / (cap_rad_per_s * cap_rad_per_s);
-    FREE_MOTION_SHARE * 0.5 * mode.hinge_energy_share(point) * frequency_rad_per_s * cap_ratio
+    NON_ROTATING_MOTION_SHARE
+        * 0.5
+        * mode.hinge_energy_share(point)
+        * frequency_rad_per_s
+        * cap_ratio
 }
 
 /// Returns the greatest shift of the suspension's modes by caps, in the complex plane.

@@ -72,7 +72,7 @@ pub(crate) fn read_machine(case: &Value) -> Machine {
 }
 
 /// Returns the reference machine that has elements of every kind.
-pub(super) fn with_every_element() -> Machine {
+pub(super) fn machine_with_every_element() -> Machine {
     read_machine(&read_reference("elements_all.json"))
 }
 
@@ -327,7 +327,7 @@ fn a_closed_stop_is_a_spring_in_parallel() {
 
 #[test]
 fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
-    let machine = with_every_element();
+    let machine = machine_with_every_element();
     let mut viscous_machine = machine.clone();
     for damper in &mut viscous_machine.dampers {
         damper.damping_n_s_per_m += 4.0 * damper.friction_n / (PI * LINEAR_SPEED_M_PER_S);
@@ -345,7 +345,7 @@ fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
 
 #[test]
 fn linear_forces_of_stops_and_bushings_are_first_order() {
-    let mut machine = with_every_element();
+    let mut machine = machine_with_every_element();
     machine.dampers.iter_mut().for_each(|damper| damper.friction_n = 0.0);
     // The stop is closed at rest, and soft enough for the first order to be a good approximation.
     machine.stops[2].clearance_m = 0.01;
@@ -391,31 +391,31 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
 
 #[test]
 fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
-    let without_friction = paper_machine(0.6, 90.0);
-    let mut with_friction_speed = without_friction.clone();
-    with_friction_speed
+    let frictionless_machine = paper_machine(0.6, 90.0);
+    let mut machine_with_friction_speed = frictionless_machine.clone();
+    machine_with_friction_speed
         .dampers
         .iter_mut()
         .for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
-    let mut with_friction = with_friction_speed.clone();
-    with_friction.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
-    with_friction.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
+    let mut machine_with_friction = machine_with_friction_speed.clone();
+    machine_with_friction.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
+    machine_with_friction.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 };
-    let [without_friction, with_friction_speed, with_friction] =
-        [without_friction, with_friction_speed, with_friction]
+    let [frictionless_machine, machine_with_friction_speed, machine_with_friction] =
+        [frictionless_machine, machine_with_friction_speed, machine_with_friction]
             .map(|machine| prepare_point(machine, spin(), 1.5));
     let method = Method::rk4(2e-4);
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         let simulate_points =
             |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
-        let single_record = simulate_points(&[&without_friction])[0];
-        assert_eq!(single_record, simulate_points(&[&with_friction_speed])[0], "{simd:?}");
+        let single_record = simulate_points(&[&frictionless_machine])[0];
+        assert_eq!(single_record, simulate_points(&[&machine_with_friction_speed])[0], "{simd:?}");
         let batch_records = simulate_points(&[
-            &without_friction,
-            &with_friction,
-            &with_friction_speed,
-            &with_friction,
-            &without_friction,
+            &frictionless_machine,
+            &machine_with_friction,
+            &machine_with_friction_speed,
+            &machine_with_friction,
+            &frictionless_machine,
         ]);
         assert_eq!(
             [batch_records[0], batch_records[2], batch_records[4]],
@@ -424,7 +424,7 @@ fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
         );
         assert_eq!(
             [batch_records[1], batch_records[3]],
-            [simulate_points(&[&with_friction])[0]; 2],
+            [simulate_points(&[&machine_with_friction])[0]; 2],
             "{simd:?}"
         );
         assert!(

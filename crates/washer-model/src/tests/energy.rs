@@ -1,7 +1,7 @@
 //! Tests of the energy balance of the machine without spin. Energy and losses are computed
 //! independently of the equations of motion.
 
-use super::elements::with_every_element;
+use super::elements::machine_with_every_element;
 use super::instruments::{mass_matrix, prepare_point};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
@@ -237,7 +237,7 @@ fn energy_drifts_by_less_than_1e_9_in_10_s_at_the_default_step() {
 
 #[test]
 fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
-    let mut machine = with_every_element();
+    let mut machine = machine_with_every_element();
     // The softness is wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
     // The clearance is small enough that the motion closes the stop before friction stops it.

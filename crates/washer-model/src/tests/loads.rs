@@ -1,7 +1,7 @@
 //! Tests of the recorded loads of stops and feet, and of the speeds of dampers, against the forces
 //! of densely sampled time histories.
 
-use super::elements::with_every_element;
+use super::elements::machine_with_every_element;
 use super::energy::{body_axes, position};
 use crate::machine::feet::{Feet, LOAD_COMPONENTS};
 use crate::machine::{Cabinet, Foot, Machine};
@@ -15,7 +15,7 @@ const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.5, 2.9], checkpoints: 0
 const INTERVAL_S: f64 = 1e-4;
 
 /// Adds a cabinet on four feet to a machine.
-fn with_cabinet(mut machine: Machine) -> Machine {
+fn machine_with_cabinet(mut machine: Machine) -> Machine {
     machine.cabinet =
         Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction_coefficient: 0.4 });
     let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
@@ -95,7 +95,7 @@ fn compute_load(
 
 #[test]
 fn recorded_loads_agree_with_a_densely_sampled_history() {
-    let mut machine = with_cabinet(with_every_element());
+    let mut machine = machine_with_cabinet(machine_with_every_element());
     machine.unbalance.mass_kg = 0.9;
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.003);
     // The cabinet is so heavy that no foot lifts. On a single foot there would be no resistance to
@@ -213,7 +213,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
 
 #[test]
 fn loads_of_the_linear_model_agree_with_its_history() {
-    let mut machine = with_cabinet(with_every_element());
+    let mut machine = machine_with_cabinet(machine_with_every_element());
     machine.unbalance.mass_kg = 0.9;
     let point = prepare_ramp_point(machine.clone());
     let method = Method::rk4(1e-4);
@@ -263,7 +263,7 @@ fn loads_of_the_linear_model_agree_with_its_history() {
 
 #[test]
 fn the_foot_loads_of_both_models_agree_for_small_motions() {
-    let mut machine = with_cabinet(with_every_element());
+    let mut machine = machine_with_cabinet(machine_with_every_element());
     machine.dampers.iter_mut().for_each(|damper| {
         damper.friction_n = 0.0;
         damper.damping_n_s_per_m = 100.0;

@@ -94,11 +94,11 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             // The deflection at which plain springs have the load of mass-scaled ones.
             let mass_scaled_deflection =
                 |moving_deflection: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
-                    let component = |i: usize| {
+                    let deflection_component = |i: usize| {
                         let Dual { value, slope } = moving_deflection[i].0;
                         N((slope.slope + speed_squared * (value.value - sag[i].0)) / (cap * cap))
                     };
-                    [component(0), component(1)]
+                    [deflection_component(0), deflection_component(1)]
                 };
             let Deflection { offset, tilt } = sag.bearing_deflection;
             let deflection = Deflection {
