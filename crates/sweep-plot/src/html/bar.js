@@ -11,7 +11,7 @@ function position(scale, value) {
 }
 
 // Draws the colour bar below a map, `margin` px from the figure's edge.
-function drawBar(context, box, layer, margin) {
+function drawColourBar(context, box, layer, margin) {
   const [y, thickness, right] = [box.top + box.height + 72, 16, box.left + box.width];
   const { colours } = layer;
   colours.forEach((colour, k) => {
@@ -44,21 +44,21 @@ function drawBar(context, box, layer, margin) {
 // Creates a pattern of slanted lines, each of a colour and a width, on a ground of a colour or on
 // a transparent one. `side` is the size of the pattern (px), which must be small enough that no
 // area lies between two lines.
-function createHatchPattern(context, ground, options = {}) {
+function createHatchPattern(context, groundColour, options = {}) {
   const { lines = [[DARK, 1]], falling = false, side = 8 } = options;
   const tile = element("canvas", { width: side, height: side });
-  const brush = tile.getContext("2d");
-  brush.fillStyle = ground ?? "transparent";
-  brush.fillRect(0, 0, side, side);
-  brush.beginPath();
-  for (const shift of [-side, 0, side]) {
-    brush.moveTo(shift, falling ? 0 : side);
-    brush.lineTo(shift + side, falling ? side : 0);
+  const tileContext = tile.getContext("2d");
+  tileContext.fillStyle = groundColour ?? "transparent";
+  tileContext.fillRect(0, 0, side, side);
+  tileContext.beginPath();
+  for (const offset of [-side, 0, side]) {
+    tileContext.moveTo(offset, falling ? 0 : side);
+    tileContext.lineTo(offset + side, falling ? side : 0);
   }
   for (const [colour, width] of lines) {
-    brush.strokeStyle = colour;
-    brush.lineWidth = (width * side) / 8;
-    brush.stroke();
+    tileContext.strokeStyle = colour;
+    tileContext.lineWidth = (width * side) / 8;
+    tileContext.stroke();
   }
   return context.createPattern(tile, "repeat");
 }

@@ -9,8 +9,8 @@ function createCells(data) {
     columns[name] = { ...column, values: decodeFloats(column.data) };
   }
   const codes = {};
-  for (const [name, coded] of Object.entries(data.codes)) {
-    codes[name] = { ...coded, values: decode(coded.data) };
+  for (const [name, column] of Object.entries(data.codes)) {
+    codes[name] = { ...column, values: decode(column.data) };
   }
   const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
   // Returns the number of a kind of points in each cell. For cells of one point it follows from the

@@ -28,8 +28,9 @@ function createDesign(main, data, panel) {
 
 // Shows the picture that the program has drawn, finds points in it under the pointer, and marks
 // them.
-function createMatrix(host, data, choose = () => {}) {
-  const directions = data.directions.map((one) => ({ ...one, values: decodeFloats(one.values) }));
+function createMatrix(host, data, choosePoint = () => {}) {
+  const directions = data.directions.map((direction) => (
+    { ...direction, values: decodeFloats(direction.values) }));
   let selected = null;
 
   const find = appendTemplate(host, "design");
@@ -42,47 +43,47 @@ function createMatrix(host, data, choose = () => {}) {
   const marks = document.createElementNS(picture.namespaceURI, "g");
   picture.append(marks);
 
-  const fraction = (one, value) => {
-    const coordinate = one.log ? Math.log : (x) => x;
-    const [from, to] = one.range.map(coordinate);
-    return (coordinate(value) - from) / (to - from);
+  const axisFraction = (direction, value) => {
+    const coordinate = direction.log ? Math.log : (x) => x;
+    const [low, high] = direction.range.map(coordinate);
+    return (coordinate(value) - low) / (high - low);
   };
   // The panels: the directions along x and y, and the rectangle in the picture, as
   // [x, y, [left, top, width, height]].
   const panels = data.panels.map(([x, y, ...box]) => [directions[x], directions[y], box]);
   // Points without a value of y lie at the lower edge.
-  const at = ([x, y, [left, top, width, height]], k) => {
-    const yFraction = fraction(y, y.values[k]);
+  const pointPosition = ([x, y, [left, top, width, height]], k) => {
+    const yFraction = axisFraction(y, y.values[k]);
     return [
-      left + fraction(x, x.values[k]) * width,
+      left + axisFraction(x, x.values[k]) * width,
       top + (Number.isFinite(yFraction) ? (1 - yFraction) * height : height - 5),
     ];
   };
   // Returns the length of a pixel of the page in units of the picture.
   const scale = () => data.view[2] / picture.clientWidth;
 
-  function showPoint(place) {
+  function showPoint(pointerPosition) {
     tip.hidden = selected === null;
-    marks.innerHTML = selected === null ? "" : panels.map((panel) => at(panel, selected))
+    marks.innerHTML = selected === null ? "" : panels.map((panel) => pointPosition(panel, selected))
       .map(([x, y]) => `<circle cx="${x}" cy="${y}" r="7"/>`).join("");
     if (selected === null) {
       announcement.textContent = "";
       return;
     }
-    const head = `Point ${data.points[selected]}: ${data.sides[data.of[selected]]}`;
+    const heading = `Point ${data.points[selected]}: ${data.sides[data.of[selected]]}`;
     const rows = directions.map(({ words, values, unit }) => [
       words, formatSignificant(values[selected]), unit,
     ]);
-    tip.replaceChildren(element("p", {}, head),
+    tip.replaceChildren(element("p", {}, heading),
       table([], rows.map(([words, ...cells]) => tableRow(words, cells))));
     tip.dataset.point = data.points[selected];
-    announcement.textContent = [head, ...rows.map((row) => row.join(" ").trim())].join("; ");
-    const [x, y] = (place ?? at(panels.at(-1), selected))
+    announcement.textContent = [heading, ...rows.map((row) => row.join(" ").trim())].join("; ");
+    const [x, y] = (pointerPosition ?? pointPosition(panels.at(-1), selected))
       .map((value, k) => (value - data.view[k]) / scale());
     placeTip(tip, [x - 16, x + 16], y + 12, [0, picture.clientHeight]);
   }
 
-  function read(event) {
+  function selectNearest(event) {
     const bounds = picture.getBoundingClientRect();
     const x = data.view[0] + (event.clientX - bounds.left) * scale();
     const y = data.view[1] + (event.clientY - bounds.top) * scale();
@@ -92,39 +93,40 @@ function createMatrix(host, data, choose = () => {}) {
       const [left, top, width, height] = panel[2];
       if (x < left || y < top || x > left + width || y > top + height) continue;
       data.of.forEach((_, k) => {
-        const [px, py] = at(panel, k);
-        const distance = Math.hypot(px - x, py - y);
+        const [pointX, pointY] = pointPosition(panel, k);
+        const distance = Math.hypot(pointX - x, pointY - y);
         if (distance < nearestDistance) [nearestDistance, selected] = [distance, k];
       });
     }
     showPoint([x, y]);
   }
 
-  figure.addEventListener("pointermove", read);
+  figure.addEventListener("pointermove", selectNearest);
   figure.addEventListener("pointerdown", (event) => {
-    read(event);
-    chosen();
+    selectNearest(event);
+    chooseSelected();
   });
-  function chosen() {
+  function chooseSelected() {
     if (selected === null) return;
-    choose(Object.fromEntries(directions.map((one) => [one.name, one.values[selected]])));
+    choosePoint(Object.fromEntries(
+      directions.map(({ name, values }) => [name, values[selected]])));
   }
   // After a touch the values stay visible, because a finger cannot hover.
-  const release = () => {
+  const deselect = () => {
     selected = null;
     showPoint();
   };
   figure.addEventListener("pointerleave", ({ pointerType }) => {
-    if (pointerType === "mouse") release();
+    if (pointerType === "mouse") deselect();
   });
-  figure.addEventListener("blur", release);
+  figure.addEventListener("blur", deselect);
   figure.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -10, ArrowDown: 10 }[event.key];
-    if (event.key === "Escape") release();
-    else if (event.key === "Enter") chosen();
+    if (event.key === "Escape") deselect();
+    else if (event.key === "Enter") chooseSelected();
     else if (step && data.of.length) {
-      const next = selected === null ? 0 : selected + step;
-      selected = Math.min(Math.max(next, 0), data.of.length - 1);
+      const nextIndex = selected === null ? 0 : selected + step;
+      selected = Math.min(Math.max(nextIndex, 0), data.of.length - 1);
       showPoint();
     } else return;
     event.preventDefault();

@@ -188,7 +188,7 @@ function createMap(host, data, panel) {
     drawAxes(context, box,
       { ...xAxis, range: range(xAxis, 0), at: (value) => toPx(box, toCoordinateX(value)) },
       { ...yAxis, range: range(yAxis, 1), at: (value) => toPy(box, toCoordinateY(value)) });
-    if (layer) drawBar(context, box, layer, MARGINS.right);
+    if (layer) drawColourBar(context, box, layer, MARGINS.right);
     figure.dataset.area = [box.left, box.top, box.width, box.height].join(" ");
     figure.dataset.view = view.flat().join(" ");
   }

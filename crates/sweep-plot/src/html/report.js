@@ -17,53 +17,55 @@ function createReport(host, data, map, panel) {
   createTable();
 
   function createTable() {
-    const heads = ["", ...data.axes.map((axis) => withUnit(axis.words, axis.unit)), "",
+    const headings = ["", ...data.axes.map((axis) => withUnit(axis.words, axis.unit)), "",
       "Largest ratio", "in", "Verdict"];
     const find = appendTemplate(document.getElementById("about"), "points");
-    const [title, more] = [find("h2:last-of-type"), find("#more")];
-    more.addEventListener("click", extend);
-    const pointTable = table(heads, [], { id: "points" });
-    more.before(pointTable);
-    const body = pointTable.tBodies[0];
+    const [title, moreButton] = [find("h2:last-of-type"), find("#more")];
+    moreButton.addEventListener("click", addRows);
+    const pointTable = table(headings, [], { id: "points" });
+    moreButton.before(pointTable);
+    const tableBody = pointTable.tBodies[0];
     const shownHead = pointTable.rows[0].cells[data.axes.length + 1];
     // The layer of the quantity shown. Unless it is the largest ratio, the table has a column for
     // it.
     let layer = null;
-    function sort() {
+    function sortPoints() {
       layer = map.layer() ?? data.layers[0];
       const { values } = columns[layer.column];
       const sign = layer.worse === "less" ? 1 : -1;
       // Points without a value come last.
-      const order = (cell) => (Number.isFinite(values[cell]) ? sign * values[cell] : Infinity);
-      filledCells.sort((a, b) => order(a) - order(b) || a - b);
+      const sortKey = (cell) => (Number.isFinite(values[cell]) ? sign * values[cell] : Infinity);
+      filledCells.sort((a, b) => sortKey(a) - sortKey(b) || a - b);
       const isOther = layer.column !== "ratio_max";
       shownHead.hidden = !isOther;
       shownHead.textContent = withUnit(layer.title, columns[layer.column].unit);
       title.textContent = `Points, the ${layer.worse ? "worst" : "greatest"} first`
         + (isOther ? `: ${layer.title}` : "");
-      body.replaceChildren();
-      shown = 0;
-      extend();
+      tableBody.replaceChildren();
+      shownCount = 0;
+      addRows();
     }
-    let shown = 0;
-    function extend() {
-      for (const cell of filledCells.slice(shown, shown + ROWS_PER_STEP)) body.append(row(cell));
-      shown = Math.min(shown + ROWS_PER_STEP, filledCells.length);
-      more.hidden = shown === filledCells.length;
-      more.textContent = `${Math.min(ROWS_PER_STEP, filledCells.length - shown)} more of `
-        + `${filledCells.length - shown}`;
+    let shownCount = 0;
+    function addRows() {
+      const newCells = filledCells.slice(shownCount, shownCount + ROWS_PER_STEP);
+      tableBody.append(...newCells.map(createRow));
+      shownCount = Math.min(shownCount + ROWS_PER_STEP, filledCells.length);
+      moreButton.hidden = shownCount === filledCells.length;
+      const hiddenCount = filledCells.length - shownCount;
+      moreButton.textContent = `${Math.min(ROWS_PER_STEP, hiddenCount)} more of ${hiddenCount}`;
     }
-    function row(cell) {
-      const show = element("button", { type: "button", onclick: () => map.go(cell) }, "show");
-      const largest = word("ratio_max_channel", cell);
+    function createRow(cell) {
+      const showButton = element("button", { type: "button", onclick: () => map.go(cell) }, "show");
+      const largestChannel = word("ratio_max_channel", cell);
       const layerValue = layer.column === "ratio_max" ? [] : [shownValue(layer.column, cell)];
       const texts = [...valuesOf(cell).map((value) => formatSignificant(value)), ...layerValue,
-        shownValue("ratio_max", cell), largest ? wordsOf(largest) : "",
+        shownValue("ratio_max", cell), largestChannel ? wordsOf(largestChannel) : "",
         verdict(cell).replace("linear model ", "")];
-      return element("tr", {}, ...[show, ...texts].map((content) => element("td", {}, content)));
+      const contents = [showButton, ...texts];
+      return element("tr", {}, ...contents.map((content) => element("td", {}, content)));
     }
-    sort();
-    map.onChange(() => map.layer() !== layer && sort());
+    sortPoints();
+    map.onChange(() => map.layer() !== layer && sortPoints());
   }
 
   function link() {
@@ -76,7 +78,7 @@ function createReport(host, data, map, panel) {
       .then(showMessage(" and copied"), showMessage(""));
   }
 
-  function restore() {
+  function restoreView() {
     if (location.hash.length < 2) return;
     let state = null;
     try {
@@ -89,7 +91,7 @@ function createReport(host, data, map, panel) {
     if (Array.isArray(state.live)) panel?.restore(state.live);
   }
 
-  function save(blob, name) {
+  function saveFile(blob, name) {
     const url = URL.createObjectURL(blob);
     element("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 10000);
@@ -107,16 +109,16 @@ function createReport(host, data, map, panel) {
     write(context, map.title(), headHeight / 3, 0.65 * headHeight,
       { align: "left", size: headHeight / 2, bold: "bold", room: image.width - headHeight });
     for (const canvas of map.canvases) context.drawImage(canvas, 0, headHeight);
-    image.toBlob((blob) => save(blob, "map.png"));
+    image.toBlob((blob) => saveFile(blob, "map.png"));
   }
 
   function numbers() {
-    const place = map.chosen();
-    if (!place) {
+    const chosenPlace = map.chosen();
+    if (!chosenPlace) {
       message.textContent = "Choose a point of the map first: click it, or press Enter on it.";
       return;
     }
-    const cell = map.index(...place);
+    const cell = map.index(...chosenPlace);
     const lines = valuesOf(cell).map((value, k) => [data.axes[k].name, value]);
     for (const [name, column] of Object.entries(columns)) {
       const value = column.values[cell];
@@ -124,8 +126,8 @@ function createReport(host, data, map, panel) {
     }
     for (const name of Object.keys(data.codes)) lines.push([name, word(name, cell) ?? ""]);
     const text = `name,value\n${lines.map((line) => line.join(",")).join("\n")}\n`;
-    save(new Blob([text], { type: "text/csv" }), `point-${shownValue("point", cell, 9)}.csv`);
+    saveFile(new Blob([text], { type: "text/csv" }), `point-${shownValue("point", cell, 9)}.csv`);
   }
 
-  restore();
+  restoreView();
 }

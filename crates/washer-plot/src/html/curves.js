@@ -5,47 +5,51 @@ const MAX_FREQUENCY_HZ = 25;
 
 // Creates the charts of time histories and spectra of both models.
 function createCurves(host, live) {
-  const instants = 1 + Math.floor((live.endS / live.everyS) * (1 + 1e-12));
-  const times = Float32Array.from({ length: instants }, (_, k) => k * live.everyS);
-  const [from, to] = live.windowS.map((timeS) => Math.round(timeS / live.everyS));
-  const size = spectrumSize(to - from + 1);
-  const binWidth = 1 / (size * live.everyS);
-  const bins = Math.min(Math.floor(MAX_FREQUENCY_HZ / binWidth), size / 2);
-  const frequencies = Float32Array.from({ length: bins }, (_, k) => k * binWidth);
+  const instantCount = 1 + Math.floor((live.endS / live.everyS) * (1 + 1e-12));
+  const times = Float32Array.from({ length: instantCount }, (_, k) => k * live.everyS);
+  const [firstIndex, lastIndex] = live.windowS.map((timeS) => Math.round(timeS / live.everyS));
+  const transformSize = spectrumSize(lastIndex - firstIndex + 1);
+  const binWidth = 1 / (transformSize * live.everyS);
+  const binCount = Math.min(Math.floor(MAX_FREQUENCY_HZ / binWidth), transformSize / 2);
+  const frequencies = Float32Array.from({ length: binCount }, (_, k) => k * binWidth);
   // The version of the motions, by which spectra know whether they are current.
   let version = 0;
-  const line = (name, colour, count, alpha) => plainLine(name, colour,
+  const createLine = (name, colour, count, alpha) => plainLine(name, colour,
     new Float32Array(count).fill(NaN), alpha);
-  const bothModels = (count) => [line("nonlinear model", "#0072b2", count),
-    line("linear model", "#d55e00", count, 0.65)];
+  const createModelLines = (count) => [createLine("nonlinear model", "#0072b2", count),
+    createLine("linear model", "#d55e00", count, 0.65)];
   const shownChannel = live.compared[Math.max(live.compared.length - 2, 0)];
   const motionPanels = live.channels.map((channel, k) => plainPanel(channel.name,
-    capitalise(channel.words), channel.unit, k === shownChannel, bothModels(instants)));
-  const gapPanel = plainPanel("gap", "Gap, drum to tub", "mm", false, bothModels(instants));
-  const speedPanel = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
+    capitalise(channel.words), channel.unit, k === shownChannel, createModelLines(instantCount)));
+  const gapPanel = plainPanel("gap", "Gap, drum to tub", "mm", false,
+    createModelLines(instantCount));
+  const speedPanel = plainPanel("speed", "Spin", "rpm", true,
+    [createLine("", "ink", instantCount)], 80);
   // Spectra are computed when they are drawn.
-  const spectrumOf = (line, source) => {
-    const [y, cache] = [new Float32Array(bins).fill(NaN), { version: -1 }];
+  const createSpectrum = (line, source) => {
+    const [y, cache] = [new Float32Array(binCount).fill(NaN), { version: -1 }];
     return Object.defineProperty({ ...line }, "y", { get() {
       if (cache.version === version) return y;
       cache.version = version;
-      y.set(spectrum(Array.from(source.y.subarray(from, to + 1)), live.everyS, bins));
+      const values = Array.from(source.y.subarray(firstIndex, lastIndex + 1));
+      y.set(spectrum(values, live.everyS, binCount));
       return y;
     } });
   };
   const spectra = live.channels.map((channel, k) => plainPanel(channel.name,
     capitalise(channel.words), channel.unit, k === shownChannel,
-    bothModels(bins).map((line, model) => spectrumOf(line, motionPanels[k].series[model]))));
-  const histories = element("div", { id: "live-histories" });
+    createModelLines(binCount)
+      .map((line, model) => createSpectrum(line, motionPanels[k].series[model]))));
+  const historyHost = element("div", { id: "live-histories" });
   const spectrumHost = element("div", { id: "live-spectrum" });
-  host.append(element("h2", {}, "Time histories"), histories,
+  host.append(element("h2", {}, "Time histories"), historyHost,
     element("h2", {}, `Spectrum from ${live.windowS[0]} to ${live.windowS[1]} s`), spectrumHost);
   const charts = [
-    createChart(histories, plainChart("Time", "s", times, [...motionPanels, gapPanel, speedPanel]),
-      "Time histories"),
+    createChart(historyHost,
+      plainChart("Time", "s", times, [...motionPanels, gapPanel, speedPanel]), "Time histories"),
     createChart(spectrumHost, plainChart("Frequency", "Hz", frequencies, spectra), "Spectrum"),
   ];
-  const columns = live.channels.length + 1;
+  const columnCount = live.channels.length + 1;
 
   return {
     show(models, speeds) {
@@ -53,11 +57,13 @@ function createCurves(host, live) {
         const count = numbers[0] === 1 ? numbers[3] : 0;
         [...live.channels, { factor: 1e3 }].forEach(({ factor }, k) => {
           const { y } = (motionPanels[k] ?? gapPanel).series[model];
-          y.forEach((_, i) => { y[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN; });
+          y.forEach((_, index) => {
+            y[index] = index < count ? numbers[4 + index * columnCount + k] * factor : NaN;
+          });
         });
       });
       version += 1;
-      speedPanel.series[0].y.set(speeds.subarray(0, instants));
+      speedPanel.series[0].y.set(speeds.subarray(0, instantCount));
       charts.forEach((chart) => chart.changed());
     },
   };

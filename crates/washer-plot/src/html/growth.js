@@ -16,8 +16,8 @@ async function computeGrowth(pool, kind, values, speeds) {
 
 // Returns the note on speeds at which the response is off the curve of a machine that runs up.
 function offCurveNote(speeds, isOnCurve) {
-  const offCurve = Array.from(speeds).filter((_, k) => isOnCurve[k] === 0);
-  const speedList = offCurve.map((rpm) => formatSignificant(rpm)).join(", ");
+  const offCurveSpeeds = Array.from(speeds).filter((_, k) => isOnCurve[k] === 0);
+  const speedList = offCurveSpeeds.map((rpm) => formatSignificant(rpm)).join(", ");
   return speedList && ` Off the curve of responses at ${speedList} rpm: a machine that runs up may `
     + "be in another motion there.";
 }
@@ -27,13 +27,13 @@ function offCurveNote(speeds, isOnCurve) {
 const HELD_METRICS = {
   async growth(pool, values, { heldSpeedsRpm: speeds }) {
     const disturbances = await computeGrowth(pool, "check", values, speeds);
-    const growth = disturbances.map(([growthPerS]) => growthPerS);
-    const greatest = Math.max(...growth.filter(Number.isFinite));
-    return [Number.isFinite(greatest) ? `Growth at most ${formatSignificant(greatest, 3)} /s, at `
-      + `${formatSignificant(speeds[growth.indexOf(greatest)])} rpm of ${speeds.length} constant `
+    const growths = disturbances.map(([growthPerS]) => growthPerS);
+    const maxGrowth = Math.max(...growths.filter(Number.isFinite));
+    return [Number.isFinite(maxGrowth) ? `Growth at most ${formatSignificant(maxGrowth, 3)} /s, at `
+      + `${formatSignificant(speeds[growths.indexOf(maxGrowth)])} rpm of ${speeds.length} constant `
       + "speeds."
       + offCurveNote(speeds, disturbances.map((disturbance) => disturbance[3]))
-      : "No response at any of the map's constant speeds.", [greatest]];
+      : "No response at any of the map's constant speeds.", [maxGrowth]];
   },
   async dwell(pool, values, { heldSpeedsRpm: speeds, channels, motions }) {
     const point = [...values, ...speeds];
@@ -52,31 +52,31 @@ function createGrowth(host, live, pool) {
   const find = appendTemplate(host, "growth");
   const [box, status, chartHost] = ["#live-growth", "#growth-status", "#live-growth-chart"]
     .map(find);
-  box.addEventListener("toggle", compute);
-  const [count, batchSize] = live.hasSlowGrowth ? SPEED_RULE.slow : SPEED_RULE.quick;
+  box.addEventListener("toggle", computePoint);
+  const [speedCount, batchSize] = live.hasSlowGrowth ? SPEED_RULE.slow : SPEED_RULE.quick;
   let point = null;
   let isDone = true;
   let requestCount = 0;
 
   // Returns the speeds in whole steps up to the greatest speed of the spin.
   function speedsUpTo(peak) {
-    const from = Math.min(SPEED_RULE.from, peak / 4);
-    const step = Math.max(1, Math.round((peak - from) / count));
-    const length = Math.max(2, 1 + Math.floor((peak - from) / step + 1e-6));
-    return Float32Array.from({ length }, (_, k) => from + step * k);
+    const minSpeed = Math.min(SPEED_RULE.from, peak / 4);
+    const speedStep = Math.max(1, Math.round((peak - minSpeed) / speedCount));
+    const length = Math.max(2, 1 + Math.floor((peak - minSpeed) / speedStep + 1e-6));
+    return Float32Array.from({ length }, (_, k) => minSpeed + speedStep * k);
   }
 
-  async function compute() {
+  async function computePoint() {
     if (!box.open || !point || isDone) return;
     isDone = true;
     requestCount += 1;
     const requestId = requestCount;
     const speeds = speedsUpTo(point.peak);
     const startMs = performance.now();
-    const [y, frequencies] = [0, 1].map(() => new Float32Array(speeds.length).fill(NaN));
-    const line = (values) => [{ ...plainLine("", "#0072b2", values), width: 1.6 }];
-    const panels = [plainPanel("growth", "Growth", "1/s", true, line(y), 200),
-      plainPanel("frequency", "Frequency", "cycles/min", true, line(frequencies), 110)];
+    const [growths, frequencies] = [0, 1].map(() => new Float32Array(speeds.length).fill(NaN));
+    const createLines = (values) => [{ ...plainLine("", "#0072b2", values), width: 1.6 }];
+    const panels = [plainPanel("growth", "Growth", "1/s", true, createLines(growths), 200),
+      plainPanel("frequency", "Frequency", "cycles/min", true, createLines(frequencies), 110)];
     panels[0].levels = [[0, "neither growth nor decay"]];
     const spec = plainChart("Spin speed", "rpm", speeds, panels);
     spec.shadeMeaning = "disturbances grow";
@@ -89,7 +89,7 @@ function createGrowth(host, live, pool) {
       const disturbances = await computeGrowth(pool, "growth", point.values, batch);
       if (requestId !== requestCount) return;
       disturbances.forEach((disturbance, i) => {
-        [y[k + i], frequencies[k + i], kinds[k + i], isOnCurve[k + i]] = disturbance;
+        [growths[k + i], frequencies[k + i], kinds[k + i], isOnCurve[k + i]] = disturbance;
       });
       remaining -= batch.length;
       status.textContent = `Computing: ${remaining} of ${speeds.length} speeds are left.`;
@@ -107,19 +107,20 @@ function createGrowth(host, live, pool) {
     }
     if (requestId !== requestCount) return;
     // The ranges of speeds at which disturbances grow.
-    const runs = [];
+    const growingRuns = [];
     speeds.forEach((_, k) => {
-      if (!(y[k] > 0)) return;
-      if (runs.at(-1)?.at(-1) === k - 1) runs.at(-1).push(k);
-      else runs.push([k]);
+      if (!(growths[k] > 0)) return;
+      if (growingRuns.at(-1)?.at(-1) === k - 1) growingRuns.at(-1).push(k);
+      else growingRuns.push([k]);
     });
-    spec.shades = runs.map((run) => [speeds[run[0]], speeds[run.at(-1)]]);
+    spec.shades = growingRuns.map((run) => [speeds[run[0]], speeds[run.at(-1)]]);
     chart.changed();
-    const rangeTexts = runs.map((run) => {
-      const peakIndex = run.reduce((a, b) => (y[b] > y[a] ? b : a));
+    const rangeTexts = growingRuns.map((run) => {
+      const peakIndex = run.reduce((a, b) => (growths[b] > growths[a] ? b : a));
       const [first, last] = [run[0], run.at(-1)].map((k) => formatSignificant(speeds[k]));
       return `from ${first} to ${last} rpm (`
-        + `${live.kinds[kinds[peakIndex]]}, at most ${formatSignificant(y[peakIndex], 3)}/s at `
+        + `${live.kinds[kinds[peakIndex]]}, at most `
+        + `${formatSignificant(growths[peakIndex], 3)}/s at `
         + `${formatSignificant(speeds[peakIndex])} rpm)`;
     });
     const summary = rangeTexts.length ? `Disturbances grow ${rangeTexts.join(", and ")}.`
@@ -128,7 +129,7 @@ function createGrowth(host, live, pool) {
     const note = offCurveNote(speeds, isOnCurve);
     status.textContent = `${summary}${note} ${speeds.length} speeds in ${seconds} s.`;
     box.dataset.speeds = speeds.join(" ");
-    box.dataset.growth = y.join(" ");
+    box.dataset.growth = growths.join(" ");
     box.dataset.point = point.values.join(" ");
   }
 
@@ -144,7 +145,7 @@ function createGrowth(host, live, pool) {
     setPoint(values, peak) {
       point = { values, peak };
       isDone = false;
-      compute();
+      computePoint();
     },
   };
 }

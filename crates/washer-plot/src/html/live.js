@@ -4,7 +4,7 @@
 const QUICK_LEVEL = 255;
 // Time without a change of the sliders after which their point is checked, ms.
 const REST_MS = 150;
-const FAILURES = ["", "diverged", "needs steps too small", "used up its steps"];
+const FAILURE_WORDS = ["", "diverged", "needs steps too small", "used up its steps"];
 // The size of a finer map: points along each axis, cells of the map that it spans without a zoom,
 // points in a call.
 const FINE_MAP = { points: 20, cells: 7, batchSize: 10 };
@@ -23,18 +23,18 @@ function createLive(host, data) {
   let fineEdges = null;
 
   const find = appendTemplate(host, "live");
-  const [panel, status, reset, refine, valuesHost, charts] = ["#live", "#live-status",
-    "#live-reset", "#refine", "#live-values", "#live-charts"].map(find);
+  const [panel, status, resetButton, refineButton, valuesHost, chartHost] = ["#live",
+    "#live-status", "#live-reset", "#refine", "#live-values", "#live-charts"].map(find);
   const inputs = live.sliders.map((slider, k) => createSlider(slider, k));
   find(".sliders").append(...inputs.map((input) => input.row));
-  values.forEach((value, k) => set(k, value));
-  reset.addEventListener("click", () => {
+  values.forEach((value, k) => setValue(k, value));
+  resetButton.addEventListener("click", () => {
     setSliders(live.sliders.flatMap(({ axis, value }, k) => (axis ? [] : [[k, value]])));
   });
-  refine.addEventListener("click", refineMap);
+  refineButton.addEventListener("click", refineMap);
   const texts = { ...live, window: live.windowS.join(" to ") };
-  for (const node of panel.querySelectorAll("[data-said]")) {
-    node.textContent = texts[node.dataset.said];
+  for (const note of panel.querySelectorAll("[data-said]")) {
+    note.textContent = texts[note.dataset.said];
   }
   panel.querySelectorAll("#computed-with ul").forEach((list, model) => {
     list.append(...live.rungs[model].map((text) => element("li", {}, text)));
@@ -46,8 +46,8 @@ function createLive(host, data) {
     find("#live-workers").textContent = `${state.ready} workers, each with a module `
       + `of its own: WebAssembly with simd128, ${state.lanes} trajectories side by side.`;
   });
-  const curves = createCurves(charts, live);
-  const growth = live.kinds.length > 0 ? createGrowth(charts, live, pool) : null;
+  const curves = createCurves(chartHost, live);
+  const growth = live.kinds.length > 0 ? createGrowth(chartHost, live, pool) : null;
 
   function createSlider(slider, k) {
     const { from, to } = slider;
@@ -59,23 +59,23 @@ function createLive(host, data) {
       "aria-label": withUnit(slider.words, slider.unit), "data-number": slider.name,
       onchange: () => {
         const typedValue = Number(number.value);
-        set(k, Number.isFinite(typedValue) ? clampToRange(typedValue) : values[k]);
-        pointChanged();
+        setValue(k, Number.isFinite(typedValue) ? clampToRange(typedValue) : values[k]);
+        updatePoint();
       },
     });
     const range = element("input", {
       type: "range", step: "any", min: toScale(from), max: toScale(to),
       "aria-label": slider.words, "data-slider": slider.name, title: slider.description,
       oninput: () => {
-        set(k, clampToRange(Number(fromScale(Number(range.value)).toPrecision(4))));
-        pointChanged();
+        setValue(k, clampToRange(Number(fromScale(Number(range.value)).toPrecision(4))));
+        updatePoint();
       },
     });
     return { number, range, toScale, row: element("label", { title: slider.description },
       element("span", {}, slider.words), range, number, element("span", {}, slider.unit)) };
   }
 
-  function set(k, value) {
+  function setValue(k, value) {
     values[k] = value;
     const { number, range, toScale } = inputs[k];
     // A value that a step of an axis has rounded is restored.
@@ -86,18 +86,18 @@ function createLive(host, data) {
 
   // Sets some sliders, each by its number and value.
   function setSliders(settings) {
-    for (const [k, value] of settings) set(k, value);
-    pointChanged();
+    for (const [k, value] of settings) setValue(k, value);
+    updatePoint();
   }
 
-  function pointChanged() {
+  function updatePoint() {
     latestRevision += 1;
     clearTimeout(restTimer);
     pool.cancel("check");
     growth?.discardPoint();
     map?.mark?.();
     if (isBusy) hasMoved = true;
-    else preview();
+    else computePreviews();
   }
 
   const request = (kind, urgency, call, rest) => pool
@@ -106,7 +106,7 @@ function createLive(host, data) {
     [model, levels[model], live.everyS]));
 
   // Computes previews until the sliders rest, and then starts the check of the point.
-  async function preview() {
+  async function computePreviews() {
     isBusy = true;
     do {
       hasMoved = false;
@@ -116,26 +116,27 @@ function createLive(host, data) {
         const [peaks, ...motions] = await Promise.all([
           request("preview", 4, "quick", [values.length]),
           ...requestMotions("preview", [QUICK_LEVEL, QUICK_LEVEL])]);
-        const duration = performance.now() - startMs;
-        const ms = [peaks, ...motions].map((answer) => answer.ms);
-        show({ ...parsedAnswer(peaks.numbers, live), isChecked: false, elapsedMs: duration, ms });
+        const durationMs = performance.now() - startMs;
+        const ms = [peaks, ...motions].map((result) => result.ms);
+        const answer = parseAnswer(peaks.numbers, live);
+        showAnswer({ ...answer, isChecked: false, elapsedMs: durationMs, ms });
         curves.show(motions.map((motion) => motion.numbers), (await speeds).numbers);
       } catch (error) {
         showError(error);
       }
     } while (hasMoved);
     isBusy = false;
-    restTimer = setTimeout(() => check(latestRevision), REST_MS);
+    restTimer = setTimeout(() => checkPoint(latestRevision), REST_MS);
   }
 
-  async function check(revision) {
+  async function checkPoint(revision) {
     try {
       const startMs = performance.now();
       const { numbers, ms } = await request("check", 2, "checked");
       if (revision !== latestRevision) return;
-      const answer = parsedAnswer(numbers, live);
+      const answer = parseAnswer(numbers, live);
       if (answer.is !== 1) return;
-      show({ ...answer, isChecked: true, elapsedMs: performance.now() - startMs, ms: [ms] });
+      showAnswer({ ...answer, isChecked: true, elapsedMs: performance.now() - startMs, ms: [ms] });
       const speedsRequest = request("check", 2, "speeds", [live.everyS]);
       const levels = answer.records.map((record) => record.rung);
       const motions = await Promise.all(requestMotions("check", levels));
@@ -152,18 +153,18 @@ function createLive(host, data) {
 
   // Shows the map's metrics at constant speeds; slow ones are computed on request.
   function showHeldMetrics(revision) {
-    const line = element("p", { id: "held" });
-    const compute = () => Promise.all(live.heldMetrics.map(async (metric) => {
-      line.textContent = "Constant speeds: computing.";
+    const paragraph = element("p", { id: "held" });
+    const computeMetrics = () => Promise.all(live.heldMetrics.map(async (metric) => {
+      paragraph.textContent = "Constant speeds: computing.";
       const [sentence, numbers] = await HELD_METRICS[metric](pool, [...values], live);
-      line.dataset[metric] = numbers.join(" ");
+      paragraph.dataset[metric] = numbers.join(" ");
       return sentence;
-    })).then((all) => {
-      if (revision === latestRevision) line.textContent = all.join(" ");
+    })).then((sentences) => {
+      if (revision === latestRevision) paragraph.textContent = sentences.join(" ");
     }, showError);
-    valuesHost.append(line);
-    if (!live.hasSlowGrowth && !live.heldMetrics.includes("dwell")) compute();
-    else line.append(element("button", { type: "button", onclick: compute },
+    valuesHost.append(paragraph);
+    if (!live.hasSlowGrowth && !live.heldMetrics.includes("dwell")) computeMetrics();
+    else paragraph.append(element("button", { type: "button", onclick: computeMetrics },
       `Compute ${live.heldMetrics.join(" and ")} at ${live.heldSpeedsRpm.length} constant speeds`));
   }
 
@@ -180,7 +181,7 @@ function createLive(host, data) {
   const isTrusted = (ratios) => greatestOf(ratios) < live.ratioLimit
     && (live.ratioMin === null || leastOf(ratios) > live.ratioMin);
 
-  function show(answer) {
+  function showAnswer(answer) {
     panel.dataset.kind = answer.isChecked ? "checked" : "preview";
     panel.dataset.point = values.join(" ");
     panel.dataset.ms = answer.ms.join(" ");
@@ -196,41 +197,43 @@ function createLive(host, data) {
       [failure, failTime, steps, gap, ...amplitudes, ...metrics].join(" ")).join(" ");
     panel.dataset.ratios = ratios.join(" ");
     panel.dataset.sag = answer.sag;
-    const greatest = greatestOf(ratios);
-    const channel = live.compared.find((index) => ratios[index] === greatest);
-    const failed = records.findIndex((record) => record.failure !== 0);
-    const verdict = failed >= 0
-      ? `The ${["nonlinear", "linear"][failed]} model ${FAILURES[records[failed].failure]} at `
-        + `${formatSignificant(records[failed].failTime)} s`
+    const greatestRatio = greatestOf(ratios);
+    const channel = live.compared.find((index) => ratios[index] === greatestRatio);
+    const failedModel = records.findIndex((record) => record.failure !== 0);
+    const verdict = failedModel >= 0
+      ? `The ${["nonlinear", "linear"][failedModel]} model `
+        + `${FAILURE_WORDS[records[failedModel].failure]} at `
+        + `${formatSignificant(records[failedModel].failTime)} s`
       : channel === undefined ? "Undefined: no excitation"
         : `Linear model ${isTrusted(ratios) ? "" : "un"}reliable here`;
-    const row = (words, unit, of, beside = "") => tableRow(withUnit(words, unit),
-      [...records.map((record) => formatSignificant(of(record))), beside]);
-    const rows = live.channels.map((channel, k) => row(channel.words, channel.unit,
+    const createRow = (words, unit, valueOf, ratioText = "") => tableRow(withUnit(words, unit),
+      [...records.map((record) => formatSignificant(valueOf(record))), ratioText]);
+    const rows = live.channels.map((channel, k) => createRow(channel.words, channel.unit,
       (record) => record.amplitudes[k] * channel.factor, formatSignificant(ratios[k])));
-    rows.push(row("Least gap, whole run", "mm", (record) => record.gap * 1e3));
-    live.metrics.forEach((metric, k) => rows.push(row(metric.words, metric.unit,
+    rows.push(createRow("Least gap, whole run", "mm", (record) => record.gap * 1e3));
+    live.metrics.forEach((metric, k) => rows.push(createRow(metric.words, metric.unit,
       (record) => record.metrics[k] * metric.factor)));
     const sag = live.hasStaticSag
       ? [element("p", {}, `Static sag of the tub ${formatSignificant(answer.sag * 1e3)} mm`)] : [];
-    const largest = channel !== undefined && `Largest ratio ${formatSignificant(greatest)} `
-      + `(${live.channels[channel].words}), the limit is ${live.ratioLimit}`;
-    const numbers = table(["", "nonlinear", "linear", "ratio"], rows);
-    numbers.prepend(element("caption", {},
+    const largestRatioText = channel !== undefined
+      && `Largest ratio ${formatSignificant(greatestRatio)} (`
+      + `${live.channels[channel].words}), the limit is ${live.ratioLimit}`;
+    const valueTable = table(["", "nonlinear", "linear", "ratio"], rows);
+    valueTable.prepend(element("caption", {},
       `${capitalise(live.criterion[0])}. Ratio: ${live.criterion[1]}.`));
     valuesHost.replaceChildren(
       element("p", { class: "kind" }, answer.isChecked ? "Checked" : "Preview, not checked"),
       element("p", { class: "verdict" }, answer.isChecked ? verdict : `${verdict}?`),
-      ...(largest ? [element("p", {}, largest)] : []),
+      ...(largestRatioText ? [element("p", {}, largestRatioText)] : []),
       ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a slightly disturbed "
         + "trajectory departs exponentially. The digits are those of one trajectory.")] : []),
-      numbers, ...sag);
-    const elapsedMs = `${answer.elapsedMs.toFixed(answer.elapsedMs < 10 ? 1 : 0)} ms`;
+      valueTable, ...sag);
+    const elapsedText = `${answer.elapsedMs.toFixed(answer.elapsedMs < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
-      ? `Checked in ${elapsedMs}: estimated relative error at most `
+      ? `Checked in ${elapsedText}: estimated relative error at most `
         + `${formatSignificant(Math.max(...records.map((record) => record.error)), 2)}; `
         + `nonlinear model by ${records[0].level}, linear model by ${records[1].level}.`
-      : `Preview in ${elapsedMs}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
+      : `Preview in ${elapsedText}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;
   }
 
@@ -238,31 +241,31 @@ function createLive(host, data) {
   function refineMap() {
     pool.cancel("fine");
     fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE_MAP.cells);
-    const step = fineEdges.map(([low, high]) => (high - low) / FINE_MAP.points);
+    const steps = fineEdges.map(([low, high]) => (high - low) / FINE_MAP.points);
     const middle = (FINE_MAP.points - 1) / 2;
-    const distance = (indices) => Math.hypot(...indices.map((index) => index - middle));
+    const distanceToMiddle = (indices) => Math.hypot(...indices.map((index) => index - middle));
     const cells = Array.from({ length: FINE_MAP.points ** 2 },
       (_, k) => [Math.floor(k / FINE_MAP.points), k % FINE_MAP.points])
-      .sort((a, b) => distance(a) - distance(b));
+      .sort((a, b) => distanceToMiddle(a) - distanceToMiddle(b));
     [fineCells, fineRemaining] = [[], cells.length];
     map.mark();
     map.request();
     for (let k = 0; k < cells.length; k += FINE_MAP.batchSize) {
       const batch = cells.slice(k, k + FINE_MAP.batchSize).map((indices) => {
-        const from = indices.map((index, axis) => fineEdges[axis][0] + index * step[axis]);
-        return { from, to: from.map((start, axis) => start + step[axis]) };
+        const from = indices.map((index, axis) => fineEdges[axis][0] + index * steps[axis]);
+        return { from, to: from.map((start, axis) => start + steps[axis]) };
       });
       const points = batch.flatMap(({ from }) => {
         const point = [...values];
-        from.forEach((even, axis) => {
-          point[map.sliders[axis]] = map.back(axis, even + 0.5 * step[axis]);
+        from.forEach((lowEnd, axis) => {
+          point[map.sliders[axis]] = map.back(axis, lowEnd + 0.5 * steps[axis]);
         });
         return point;
       });
       pool.request("fine", 1, "quick", points, [values.length]).then(({ numbers }) => {
-        const width = numbers.length / batch.length;
+        const answerLength = numbers.length / batch.length;
         batch.forEach((cell, k) => {
-          const answer = parsedAnswer(numbers.slice(k * width, (k + 1) * width), live);
+          const answer = parseAnswer(numbers.slice(k * answerLength, (k + 1) * answerLength), live);
           const { ratios, byColumn } = answer;
           const extremes = { ratio_max: greatestOf(ratios), ratio_min: leastOf(ratios) };
           if (answer.is === 1) fineCells.push({ ...cell, columns: { ...byColumn, ...extremes } });
@@ -277,8 +280,9 @@ function createLive(host, data) {
   // Returns the sliders of axes, and the middles of their ranges.
   function withoutMap() {
     const sliders = live.sliders.flatMap((slider, k) => (slider.axis ? [k] : []));
-    const middle = ({ from, to, log }) => (log ? Math.sqrt(from * to) : 0.5 * (from + to));
-    return { sliders, start: sliders.map((k) => Number(middle(live.sliders[k]).toPrecision(4))) };
+    const findMiddle = ({ from, to, log }) => (log ? Math.sqrt(from * to) : 0.5 * (from + to));
+    const start = sliders.map((k) => Number(findMiddle(live.sliders[k]).toPrecision(4)));
+    return { sliders, start };
   }
 
   const axisSettings = (point) => point.map((value, k) => [map.sliders[k], value]);
@@ -286,7 +290,7 @@ function createLive(host, data) {
     // The interface for the figure; `connect` passes the interface of a map to this panel.
     connect(mapInterface = withoutMap()) {
       map = mapInterface;
-      refine.hidden = !map.region;
+      refineButton.hidden = !map.region;
       setSliders(axisSettings(map.start));
     },
     pinned: (point) => setSliders(axisSettings(point)),
@@ -331,28 +335,29 @@ function createLive(host, data) {
 
 // Reads the module's answer for a point by name (`exports.rs` of washer-live), in displayed units
 // under the names of a map's columns.
-function parsedAnswer(numbers, live) {
+function parseAnswer(numbers, live) {
   const rest = [...numbers];
-  const take = (count) => rest.splice(0, count);
-  const [is, sensitive] = take(2);
+  const takeNumbers = (count) => rest.splice(0, count);
+  const [is, sensitive] = takeNumbers(2);
   const records = [0, 1].map(() => {
-    const [rung, level, error, failure, failTime, steps, gap] = take(7);
-    const [amplitudes, metrics] = [take(live.channels.length), take(live.metrics.length)];
+    const [rung, level, error, failure, failTime, steps, gap] = takeNumbers(7);
+    const amplitudes = takeNumbers(live.channels.length);
+    const metrics = takeNumbers(live.metrics.length);
     return {
       rung, level: live.levels[level], error, failure, failTime, steps, gap, amplitudes, metrics,
     };
   });
-  const ratios = take(live.channels.length);
+  const ratios = takeNumbers(live.channels.length);
   const byColumn = { static_sag_m: rest[0] * 1e3 };
   live.channels.forEach(({ name }, k) => { byColumn[`ratio_${name}`] = ratios[k]; });
-  ["nonlinear", "linear"].forEach((model, of) => {
-    const { gap, amplitudes, metrics } = records[of];
+  ["nonlinear", "linear"].forEach((model, index) => {
+    const { gap, amplitudes, metrics } = records[index];
     byColumn[`min_gap_${model}_m`] = gap * 1e3;
     live.channels.forEach(({ name, factor }, k) => {
       byColumn[`${model}_${name}`] = amplitudes[k] * factor;
     });
     live.metrics.forEach(({ columns, factor }, k) => {
-      byColumn[columns[of]] = metrics[k] * factor;
+      byColumn[columns[index]] = metrics[k] * factor;
     });
   });
   return { is, sensitive: sensitive === 1, records, ratios, sag: rest[0], byColumn };

@@ -10,12 +10,12 @@ const ABORT_DELAY_MS = 60;
 function createPool(module, setup, report) {
   const source = document.getElementById("worker").textContent;
   const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
-  const count = Math.min(Math.max(navigator.hardwareConcurrency || 2, 2), MAX_WORKERS);
-  const state = { workers: count, ready: 0, lanes: 0, error: null };
+  const workerCount = Math.min(Math.max(navigator.hardwareConcurrency || 2, 2), MAX_WORKERS);
+  const state = { workers: workerCount, ready: 0, lanes: 0, error: null };
   const members = [];
   let queue = [];
   let nextId = 0;
-  let compiled = null;
+  let readyModule = null;
 
   function reportFailure(error) {
     state.error = error;
@@ -42,7 +42,7 @@ function createPool(module, setup, report) {
       assignTasks();
     };
     member.worker.onerror = (event) => reportFailure(event.message || "a worker did not start");
-    member.worker.postMessage({ module: compiled, setup });
+    member.worker.postMessage({ module: readyModule, setup });
   }
 
   function assignTasks() {
@@ -86,8 +86,8 @@ function createPool(module, setup, report) {
   }
 
   module.then((bytes) => WebAssembly.compile(bytes)).then((compiledModule) => {
-    compiled = compiledModule;
-    for (let k = 0; k < count; k++) {
+    readyModule = compiledModule;
+    for (let k = 0; k < workerCount; k++) {
       members.push({});
       startWorker(members[k]);
     }

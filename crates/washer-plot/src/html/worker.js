@@ -5,23 +5,23 @@ let module = null;
 let setup = null;
 let api = null;
 
-function write(numbers) {
+function writeNumbers(numbers) {
   const address = api.input(numbers.length);
   new Float64Array(api.memory.buffer, address, numbers.length).set(numbers);
 }
 
-async function start() {
+async function startModule() {
   const instance = await WebAssembly.instantiate(module, {});
   api = instance.exports;
-  write(setup);
+  writeNumbers(setup);
   if (api.setup() !== 1) throw new Error("the module refuses its setup");
 }
 
-async function answer({ id, call, numbers, rest = [] }) {
+async function answerCall({ id, call, numbers, rest = [] }) {
   try {
-    if (!api) await start();
+    if (!api) await startModule();
     const startMs = performance.now();
-    write(numbers);
+    writeNumbers(numbers);
     const count = api[call](...rest);
     const ms = performance.now() - startMs;
     const result = new Float64Array(api.memory.buffer, api.output(), count).slice();
@@ -35,12 +35,12 @@ async function answer({ id, call, numbers, rest = [] }) {
 
 onmessage = async ({ data }) => {
   if (data.call) {
-    await answer(data);
+    await answerCall(data);
     return;
   }
   ({ module, setup } = data);
   try {
-    await start();
+    await startModule();
     postMessage({ ready: true, lanes: api.lanes() });
   } catch (error) {
     postMessage({ ready: false, error: String(error) });
