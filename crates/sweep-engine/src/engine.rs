@@ -39,13 +39,14 @@ pub fn evaluate_points(
     context: &RunContext<'_>,
 ) -> Option<Vec<PointRows>> {
     let point_queue = Mutex::new(axis_values.iter().enumerate());
-    let source = || lock(&point_queue).next().map(|(point, values)| (point as u64, values.clone()));
-    let results = Mutex::new(Vec::with_capacity(axis_values.len()));
-    let sink = |result: PointRows| lock(&results).push(result);
-    evaluator.evaluate(&source, &sink, context);
-    let mut results = into_content(results);
-    results.sort_by_key(|result| result.point);
-    (results.len() == axis_values.len()).then_some(results)
+    let point_source =
+        || lock(&point_queue).next().map(|(point, values)| (point as u64, values.clone()));
+    let rows_by_point = Mutex::new(Vec::with_capacity(axis_values.len()));
+    let row_sink = |result: PointRows| lock(&rows_by_point).push(result);
+    evaluator.evaluate(&point_source, &row_sink, context);
+    let mut rows_by_point = into_content(rows_by_point);
+    rows_by_point.sort_by_key(|result| result.point);
+    (rows_by_point.len() == axis_values.len()).then_some(rows_by_point)
 }
 
 /// An evaluator with the facts that a run needs of it.
@@ -146,14 +147,14 @@ impl IncompleteGroups {
     /// Adds a result to a group of `size` results. Returns the group's results, sorted by point, if
     /// that completes it.
     pub fn add_result(&self, group: u64, size: u64, result: PointRows) -> Option<Vec<PointRows>> {
-        let mut groups = lock(&self.0);
-        let results = groups.entry(group).or_default();
+        let mut incomplete_groups = lock(&self.0);
+        let results = incomplete_groups.entry(group).or_default();
         results.push(result);
         if (results.len() as u64) < size {
             return None;
         }
-        let mut complete_group = groups.remove(&group)?;
-        drop(groups);
+        let mut complete_group = incomplete_groups.remove(&group)?;
+        drop(incomplete_groups);
         complete_group.sort_by_key(|result| result.point);
         Some(complete_group)
     }

@@ -63,12 +63,12 @@ impl Estimate {
         let context = RunContext::new(&interrupt);
         let pool = threads::build_pool(1)?;
         let start_time = Instant::now();
-        let results =
+        let rows_by_point =
             pool.install(|| evaluate_points(engine.evaluator.as_ref(), &axis_values, &context));
         let core_s_per_point = start_time.elapsed().as_secs_f64() / sampled_points as f64;
         let layout = M::layout(plan);
         let mut sample_statuses = NameCounts::new();
-        for row in results.iter().flatten().flat_map(|result| &result.rows) {
+        for row in rows_by_point.iter().flatten().flat_map(|result| &result.rows) {
             if let Some(status) = layout.name(row, "status") {
                 count_name(&mut sample_statuses, status);
             }

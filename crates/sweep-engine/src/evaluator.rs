@@ -88,22 +88,22 @@ impl<'a> CachedEvaluator<'a> {
     /// Any [`SearchStop`].
     pub fn evaluate(
         &self,
-        keys: &[TrialKey],
+        request_keys: &[TrialKey],
         points_per_request: u64,
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
         reduce: &(dyn Fn(usize, Vec<PointRows>) -> Result<RequestValues, StoreError> + Sync),
     ) -> Result<Vec<RequestValues>, SearchStop> {
         let cached_values: Vec<Option<RequestValues>> =
-            keys.iter().map(|key| self.look_up_values(key)).collect();
+            request_keys.iter().map(|key| self.look_up_values(key)).collect();
         let missing_requests: Vec<usize> =
-            (0..keys.len()).filter(|&k| cached_values[k].is_none()).collect();
-        self.count_requests((keys.len() - missing_requests.len()) as u64);
+            (0..request_keys.len()).filter(|&k| cached_values[k].is_none()).collect();
+        self.count_requests((request_keys.len() - missing_requests.len()) as u64);
         // The points of all requests are one queue, so that they fill lanes together.
         let point_queue = Mutex::new(
             missing_requests.iter().flat_map(|&k| (0..points_per_request).map(move |row| (k, row))),
         );
         let context = RunContext::new(self.interrupt);
-        let source = || {
+        let point_source = || {
             let (k, row) = if context.must_stop() { None } else { lock(&point_queue).next() }?;
             Some((k as u64 * points_per_request + row, axis_values(k, row)))
         };
@@ -119,7 +119,7 @@ impl<'a> CachedEvaluator<'a> {
             } else {
                 scope.spawn(|_| {
                     let sender = sender;
-                    let sink = |result: PointRows| {
+                    let row_sink = |result: PointRows| {
                         let request_index = result.point / points_per_request;
                         let Some(results) = incomplete_requests.add_result(
                             request_index,
@@ -132,7 +132,7 @@ impl<'a> CachedEvaluator<'a> {
                         // The receiver outlives the engine's work.
                         let _ = sender.send((k, reduce(k, results)));
                     };
-                    evaluator.evaluate(&source, &sink, &context);
+                    evaluator.evaluate(&point_source, &row_sink, &context);
                 });
             }
             loop {
@@ -140,7 +140,7 @@ impl<'a> CachedEvaluator<'a> {
                     Ok((k, values)) => {
                         self.count_requests(1);
                         values.and_then(|values| {
-                            self.store_values(&keys[k], &values)?;
+                            self.store_values(&request_keys[k], &values)?;
                             values_by_request[k] = Some(values);
                             Ok(())
                         })
@@ -162,8 +162,8 @@ impl<'a> CachedEvaluator<'a> {
     }
 
     fn look_up_values(&self, key: &TrialKey) -> Option<RequestValues> {
-        let cache = lock(&self.cache);
-        let cells = cache.as_ref()?.find_values(key)?;
+        let trial_cache = lock(&self.cache);
+        let cells = trial_cache.as_ref()?.find_values(key)?;
         Some(cells.iter().map(|cell| cell.map(f64::from_bits)).collect())
     }
 

@@ -195,19 +195,21 @@ impl AxisValues {
     pub fn value(&self, i: u64) -> f64 {
         let (from, to, count) = match *self {
             Self::List(ref values) => {
-                let last = values.len() - 1;
-                return values[usize::try_from(i).map_or(last, |i| i.min(last))];
+                let last_index = values.len() - 1;
+                return values[usize::try_from(i).map_or(last_index, |i| i.min(last_index))];
             }
             Self::Linear { from, to, count } | Self::Log { from, to, count } => (from, to, count),
             Self::Distributed(Distribution { from, to, .. }) => (from, to, 2),
         };
-        let step = i as f64;
-        let last = (count - 1) as f64;
+        let step_index = i as f64;
+        let last_index = (count - 1) as f64;
         match self {
             _ if i == 0 => from,
             _ if i + 1 >= count => to,
-            Self::Log { .. } => from * libm::exp10(step * (libm::log10(to / from) / last)),
-            _ => step * ((to - from) / last) + from,
+            Self::Log { .. } => {
+                from * libm::exp10(step_index * (libm::log10(to / from) / last_index))
+            }
+            _ => step_index * ((to - from) / last_index) + from,
         }
     }
 
@@ -231,9 +233,9 @@ impl AxisValues {
     pub fn extremes(&self) -> [f64; 2] {
         let end_values = [0, self.len() - 1].map(|i| self.value(i));
         let values = if let Self::List(values) = self { values } else { &end_values[..] };
-        let least = values.iter().copied().min_by(f64::total_cmp);
-        let greatest = values.iter().copied().max_by(f64::total_cmp);
-        [least, greatest].map(Option::unwrap_or_default)
+        let least_value = values.iter().copied().min_by(f64::total_cmp);
+        let greatest_value = values.iter().copied().max_by(f64::total_cmp);
+        [least_value, greatest_value].map(Option::unwrap_or_default)
     }
 }
 
@@ -265,10 +267,10 @@ impl<M: Model> Plan<M> {
             return self.axes.iter().enumerate().map(axis_value).collect();
         }
         let mut values = vec![0.0; self.axes.len()];
-        let mut remainder = point;
+        let mut remaining_index = point;
         for (axis_value, axis) in values.iter_mut().zip(&self.axes).rev() {
-            *axis_value = axis.values.value(remainder % axis.values.len());
-            remainder /= axis.values.len();
+            *axis_value = axis.values.value(remaining_index % axis.values.len());
+            remaining_index /= axis.values.len();
         }
         values
     }

@@ -202,11 +202,11 @@ impl Runner<'_> {
     fn compute_missing_chunks(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::build_pool(self.threads)?;
         let stored_rows = |point| run.find_stored_rows(point);
-        let context = RunContext::with_known_rows(self.interrupt, &stored_rows);
+        let run_context = RunContext::with_known_rows(self.interrupt, &stored_rows);
         let (_, stored_point_count) = run.count_own_points();
         // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
-        let collector = ChunkCollector::new(self, run, &context, sender);
+        let collector = ChunkCollector::new(self, run, &run_context, sender);
         let collection_result = Mutex::new(Ok(()));
         let write_result = pool.in_place_scope(|scope| {
             scope.spawn(|_| *lock(&collection_result) = collector.run());
@@ -218,7 +218,7 @@ impl Runner<'_> {
                             // Invalid rows lose one chunk; a failing disk would lose all further
                             // ones.
                             if !matches!(error, StoreError::Engine { .. }) {
-                                context.abort();
+                                run_context.abort();
                             }
                             write_result = write_result.and(Err(error));
                         }
@@ -226,7 +226,7 @@ impl Runner<'_> {
                     Err(RecvTimeoutError::Timeout) => {}
                     Err(RecvTimeoutError::Disconnected) => return write_result,
                 }
-                self.progress.show(stored_point_count + context.points_done());
+                self.progress.show(stored_point_count + run_context.points_done());
             }
         });
         write_result.and(into_content(collection_result))
@@ -288,14 +288,14 @@ impl<'a> ChunkCollector<'a> {
 
     fn evaluate_missing_rows(&self) -> Result<(), StoreError> {
         let Runner { engine, job, .. } = self.runner;
-        let source = || {
+        let point_source = || {
             let point =
                 if self.context.must_stop() { None } else { lock(&self.point_queue).next() }?;
             Some((point, (job.axis_values)(point)))
         };
-        let sink = |row| self.add_row(row);
-        let run_engine = || engine.evaluator.evaluate(&source, &sink, self.context);
-        let reason = match catch_unwind(AssertUnwindSafe(run_engine)) {
+        let row_sink = |row| self.add_row(row);
+        let run_engine = || engine.evaluator.evaluate(&point_source, &row_sink, self.context);
+        let failure_reason = match catch_unwind(AssertUnwindSafe(run_engine)) {
             Err(panic) => format!("the engine panicked: {}", panics::panic_message(panic.as_ref())),
             Ok(()) if self.context.must_stop() => return Ok(()),
             Ok(()) => "the engine ended before it had evaluated all points".to_owned(),
@@ -306,9 +306,11 @@ impl<'a> ChunkCollector<'a> {
         let unstarted_points = lock(&self.point_queue).next().map(|point| point..point + 1);
         match unfinished_points.or(unstarted_points) {
             None => Ok(()),
-            Some(Range { start: first, end }) => {
-                Err(StoreError::Engine { first, last: end.saturating_sub(1), reason })
-            }
+            Some(Range { start: first, end }) => Err(StoreError::Engine {
+                first,
+                last: end.saturating_sub(1),
+                reason: failure_reason,
+            }),
         }
     }
 

@@ -137,8 +137,8 @@ impl Table {
             common_writer_properties(version, self.metadata).set_dictionary_enabled(false).build();
         let field_and_array = |(column, array): (DeclaredColumn, ArrayRef)| {
             let data_type = array.data_type().clone();
-            let nullable = data_type == DataType::Float64;
-            (column.arrow_field(data_type, nullable), array)
+            let is_nullable = data_type == DataType::Float64;
+            (column.arrow_field(data_type, is_nullable), array)
         };
         let (fields, arrays): (Vec<Field>, _) =
             self.columns.into_iter().map(field_and_array).unzip();

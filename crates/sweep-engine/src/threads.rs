@@ -78,10 +78,10 @@ pub fn check_count(threads: usize) -> Result<usize, ThreadsError> {
 /// # Errors
 /// [`ThreadsError::Scheduler`].
 pub fn choose_count(
-    requested: Option<usize>,
-    environment: Environment<'_>,
+    requested_count: Option<usize>,
+    environment_lookup: Environment<'_>,
 ) -> Result<usize, ThreadsError> {
-    match (requested, environment(SLURM_CORES)) {
+    match (requested_count, environment_lookup(SLURM_CORES)) {
         (Some(threads), _) => Ok(threads),
         (None, Some(given)) => parse_count(&given).map_err(|_| ThreadsError::Scheduler { given }),
         (None, None) => Ok(count_cores()),

@@ -40,8 +40,8 @@ pub(super) fn lattice_columns(span: &Span, cells: usize) -> Vec<f64> {
 
 /// Returns the ranks of the lattice lines among `lines` lines: evenly spread, with both ends.
 pub(super) fn lattice_ranks(lines: usize, cells: usize) -> Vec<usize> {
-    let Some(last) = lines.checked_sub(1) else { return Vec::new() };
-    let mut ranks: Vec<usize> = (0..=cells).map(|k| (k * last + cells / 2) / cells).collect();
+    let Some(last_rank) = lines.checked_sub(1) else { return Vec::new() };
+    let mut ranks: Vec<usize> = (0..=cells).map(|k| (k * last_rank + cells / 2) / cells).collect();
     ranks.dedup();
     ranks
 }

@@ -80,10 +80,10 @@ pub fn traceable_columns<M: Model>(plan: &Plan<M>) -> Vec<(DeclaredColumn, Plan<
     plan_with_lower_limit.reliability.limits.lower =
         Some(plan.reliability.limits.over_estimate_limit());
     let other_plans = [plan.clone(), plan_with_lower_limit].into_iter().chain(M::variants(plan));
-    let plans =
+    let plans_and_columns =
         M::ABOUT.channels.iter().map(plan_of_channel).chain(other_plans.map(|plan| (plan, None)));
     let mut columns: Vec<(DeclaredColumn, Plan<M>)> = Vec::new();
-    for (plan, allowed_columns) in plans {
+    for (plan, allowed_columns) in plans_and_columns {
         for column in M::layout(&plan).columns {
             let has_numbers =
                 matches!(column.cell_type, CellType::Measured | CellType::Time | CellType::Count);
@@ -216,11 +216,11 @@ pub fn row_margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowEr
     if !goal.is_constraint() {
         return Ok(Some(goal_value));
     }
-    let slack = goal.slack(row)?.map(|slack| slack.relative);
+    let relative_slack = goal.slack(row)?.map(|slack| slack.relative);
     // The condition itself decides at its limits, where the slack is 0.
-    Ok(Some(match (goal_value == 0.0, slack) {
-        (true, slack) => slack.unwrap_or(1.0).max(f64::MIN_POSITIVE),
-        (false, slack) => slack.unwrap_or(-1.0).min(0.0),
+    Ok(Some(match (goal_value == 0.0, relative_slack) {
+        (true, relative_slack) => relative_slack.unwrap_or(1.0).max(f64::MIN_POSITIVE),
+        (false, relative_slack) => relative_slack.unwrap_or(-1.0).min(0.0),
     }))
 }
 
@@ -278,8 +278,8 @@ pub fn find_quantity<M: Model>(
         return Err(Error::option("--quantity", name, expected));
     };
     let is_ratio = name.starts_with(RATIO_PREFIX);
-    let scale = column.limit_scale.unwrap_or(limit_value.abs());
-    if !limit_value.is_finite() || (is_ratio && limit_value <= 0.0) || scale == 0.0 {
+    let distance_scale = column.limit_scale.unwrap_or(limit_value.abs());
+    if !limit_value.is_finite() || (is_ratio && limit_value <= 0.0) || distance_scale == 0.0 {
         let expected = format!("a number greater than 0, as {name} is never below");
         return Err(Error::option("--limit", limit_value, expected));
     }
@@ -296,7 +296,7 @@ pub fn find_quantity<M: Model>(
         distance_scale: if is_ratio {
             DistanceScale::Logarithm
         } else {
-            DistanceScale::Difference(scale)
+            DistanceScale::Difference(distance_scale)
         },
     };
     Ok((quantity, plan))

@@ -81,16 +81,16 @@ impl<M: Model> BoundaryTask<M> {
                 derive_quantity(plan, &options.quantity, options.limit)?;
             (quantity, Some(goal), plan)
         };
-        let refuse = |reason: String| Err(Error::Refused(reason));
+        let refuse_task = |reason: String| Err(Error::Refused(reason));
         if plan.design.is_some() {
-            return refuse(
+            return refuse_task(
                 "a boundary runs over the axes of a grid, and this file has a [design]: remove \
                  it, and give [[axis]] twice"
                     .to_owned(),
             );
         }
         let [first, second, other_axes @ ..] = plan.axes.as_slice() else {
-            return refuse(format!(
+            return refuse_task(format!(
                 "a boundary runs over two axes, and this grid has {}: give [[axis]] twice, first \
                  the one along which the curve is wanted, then the one that is searched; one that \
                  --at gives a value is no axis, one with `values` of one number is",
@@ -99,17 +99,17 @@ impl<M: Model> BoundaryTask<M> {
         };
         let [least, greatest] = second.values.extremes();
         if least >= greatest {
-            return refuse(format!(
+            return refuse_task(format!(
                 "the second axis, `{}`, has one value: give it the range to search, as range = {{ \
                  from, to, count }} or as `values` whose least and greatest are its ends",
                 second.parameter.name
             ));
         }
         // Plans hold at most 1e12 points, so the products fit.
-        let curves: u64 = other_axes.iter().map(|axis| axis.values.len()).product();
-        let line_count = first.values.len() * curves;
+        let curve_count: u64 = other_axes.iter().map(|axis| axis.values.len()).product();
+        let line_count = first.values.len() * curve_count;
         if line_count > MAX_LINES {
-            return refuse(format!(
+            return refuse_task(format!(
                 "{line_count} rows (values of the first axis, times the combinations of the axes \
                  beyond the second) are more than {MAX_LINES}: trace parts of them"
             ));
@@ -119,7 +119,7 @@ impl<M: Model> BoundaryTask<M> {
         let requested_tolerance =
             options.tolerance.unwrap_or(range_extent / DEFAULT_TOLERANCES_PER_RANGE);
         if !(range_extent * MIN_TOLERANCE_FRACTION..=range_extent).contains(&requested_tolerance) {
-            return refuse(format!(
+            return refuse_task(format!(
                 "--tolerance {requested_tolerance} is out of range: expected from {:e} to \
                  {range_extent} for the second axis",
                 range_extent * MIN_TOLERANCE_FRACTION
@@ -139,7 +139,7 @@ impl<M: Model> BoundaryTask<M> {
             quantity,
             expression,
             first_values,
-            curve_count: curves as usize,
+            curve_count: curve_count as usize,
             range: search,
         })
     }

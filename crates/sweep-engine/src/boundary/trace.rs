@@ -47,11 +47,11 @@ pub fn trace_boundary<E>(
     search: &SearchRange,
     report_lines: &mut dyn FnMut(usize),
 ) -> Result<TracedBoundary, E> {
-    let mut boundary =
+    let mut traced_boundary =
         TracedBoundary { rows_by_curve: Vec::with_capacity(curves), ..TracedBoundary::default() };
     let curves_at_once = (MAX_GROUP_LINES / first_values.len().max(1)).max(1);
-    while boundary.rows_by_curve.len() < curves {
-        let first_curve = boundary.rows_by_curve.len();
+    while traced_boundary.rows_by_curve.len() < curves {
+        let first_curve = traced_boundary.rows_by_curve.len();
         let end_curve = (first_curve + curves_at_once).min(curves);
         let mut curve_group = CurveGroup::new(first_curve..end_curve, first_values, search);
         loop {
@@ -65,12 +65,12 @@ pub fn trace_boundary<E>(
             for (request, distance) in batch.iter().zip(distances) {
                 curve_group.insert_distance(request, distance);
             }
-            boundary.trial_count += trials.len();
-            boundary.batch_count += 1;
+            traced_boundary.trial_count += trials.len();
+            traced_boundary.batch_count += 1;
         }
-        boundary.rows_by_curve.extend(curve_group.into_rows());
+        traced_boundary.rows_by_curve.extend(curve_group.into_rows());
     }
-    Ok(boundary)
+    Ok(traced_boundary)
 }
 
 /// A trial, with the line that needs it: its curve within the block, its rank along the first axis,
@@ -132,15 +132,15 @@ impl<'a> CurveGroup<'a> {
 
     /// Returns the trials of the next batch, in the order of their lines; none when all is traced.
     fn next_batch(&mut self) -> Vec<TrialRequest> {
-        let mut batch = Vec::new();
+        let mut requests = Vec::new();
         for curve in 0..self.curves.len() {
             for rank in 0..self.lines.len() {
-                self.request_trials(curve, rank, &mut batch);
+                self.request_trials(curve, rank, &mut requests);
             }
             for rank in 0..self.lines.len() {
                 if self.curves[curve][rank].search.is_none() && self.can_begin(curve, rank) {
                     self.begin_line(curve, rank);
-                    self.request_trials(curve, rank, &mut batch);
+                    self.request_trials(curve, rank, &mut requests);
                 }
             }
             for (rank, positions) in self.find_disputes(curve) {
@@ -149,10 +149,10 @@ impl<'a> CurveGroup<'a> {
                 line_state.disputed_samples += positions.len();
                 line_state.is_traced = false;
                 search.request_samples(positions, &self.span);
-                self.request_trials(curve, rank, &mut batch);
+                self.request_trials(curve, rank, &mut requests);
             }
         }
-        batch
+        requests
     }
 
     /// Adds the trials that a line needs next to the batch.
@@ -233,7 +233,7 @@ impl<'a> CurveGroup<'a> {
     /// Returns, by rank, the positions that subdivide the intervals about which neighbours
     /// disagree.
     fn find_disputes(&self, curve: usize) -> Vec<(usize, Vec<f64>)> {
-        let mut disputes = Vec::new();
+        let mut positions_by_rank = Vec::new();
         for (rank, state) in self.curves[curve].iter().enumerate() {
             if !state.is_traced || state.disputed_samples >= MAX_DISPUTED_SAMPLES {
                 continue;
@@ -257,10 +257,10 @@ impl<'a> CurveGroup<'a> {
                 }
             }
             if !positions.is_empty() {
-                disputes.push((rank, positions));
+                positions_by_rank.push((rank, positions));
             }
         }
-        disputes
+        positions_by_rank
     }
 
     fn insert_distance(&mut self, request: &TrialRequest, distance: Option<f64>) {

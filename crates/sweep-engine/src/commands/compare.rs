@@ -80,12 +80,15 @@ Values of --fail-on:
 pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     let compared_files = [&args.first, &args.second];
     compared_files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
-    let tables = [ResultTable::open(compared_files[0])?, ResultTable::open(compared_files[1])?];
+    let compared_tables =
+        [ResultTable::open(compared_files[0])?, ResultTable::open(compared_files[1])?];
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
-    let comparison = compare(&tables[0], &tables[1])?;
-    if let Some([check_name, needed_files]) =
-        args.fail_on.iter().find_map(|fail_on| fail_on.find_unmet_need(&comparison, &tables))
+    let comparison = compare(&compared_tables[0], &compared_tables[1])?;
+    if let Some([check_name, needed_files]) = args
+        .fail_on
+        .iter()
+        .find_map(|fail_on| fail_on.find_unmet_need(&comparison, &compared_tables))
     {
         return Err(Error::option("--fail-on", check_name, needed_files));
     }
@@ -95,13 +98,13 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
             return Err(Error::option("--out", path.display(), expected));
         }
         output.finish(
-            &differences::differences_table(args, &comparison, &tables, M::ABOUT.build)
+            &differences::differences_table(args, &comparison, &compared_tables, M::ABOUT.build)
                 .into_bytes(path)?,
         )?;
     }
     let violations: Vec<String> =
         args.fail_on.iter().filter_map(|fail_on| fail_on.describe_violation(&comparison)).collect();
-    let overridden_numbers = find_overridden::<M>(&tables, &comparison);
+    let overridden_numbers = find_overridden::<M>(&compared_tables, &comparison);
     if args.json {
         show(&format!("{:#}\n", to_json(args, &comparison, &overridden_numbers, &violations)))?;
     } else if args.markdown {
@@ -160,22 +163,26 @@ struct TitledTable {
 /// Returns the tables of rows that differ, without empty ones.
 fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledTable> {
     let max_rows = usize::from(args.rows);
-    let mut tables = Vec::new();
-    let mut add_table = |title: String,
-                         rows: Vec<&SharedRow>,
-                         cells: &dyn Fn(&SharedRow) -> ComparedCells| {
-        if rows.is_empty() {
-            return;
-        }
-        let table_row = |row: &SharedRow| -> Vec<String> {
-            let (sides, change) = cells(row);
-            row.key.iter().map(|value| format_number(*value)).chain(sides).chain(change).collect()
+    let mut titled_tables = Vec::new();
+    let mut add_table =
+        |title: String, rows: Vec<&SharedRow>, cells: &dyn Fn(&SharedRow) -> ComparedCells| {
+            if rows.is_empty() {
+                return;
+            }
+            let table_row = |row: &SharedRow| -> Vec<String> {
+                let (sides, change_text) = cells(row);
+                row.key
+                    .iter()
+                    .map(|value| format_number(*value))
+                    .chain(sides)
+                    .chain(change_text)
+                    .collect()
+            };
+            let rows: Vec<_> = rows.into_iter().map(table_row).collect();
+            let headings = comparison.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+            let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
+            titled_tables.push(TitledTable { title, headings, rows });
         };
-        let rows: Vec<_> = rows.into_iter().map(table_row).collect();
-        let headings = comparison.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
-        let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
-        tables.push(TitledTable { title, headings, rows });
-    };
     // If results have a lower limit of ratios, the least ratio decides on the verdict too.
     let has_lower_limit =
         comparison.changed_columns.iter().any(|column| column.name == "ratio_min");
@@ -202,22 +209,22 @@ fn difference_tables(args: &CompareArgs, comparison: &Comparison) -> Vec<TitledT
     for (sensitive, row_kind) in [(false, ""), (true, " of sensitive rows")] {
         let rows = comparison.most_deviating(max_rows, sensitive, SharedRow::ratio_deviation);
         add_table(format!("greatest changes of the ratio{row_kind}"), rows, &|row| {
-            let change = row.ratio_quotient().map(|change| 100.0 * (change - 1.0));
-            let change =
-                change.map_or_else(|| format_optional(None), |change| format!("{change:+.3} %"));
-            (row.ratios.map(format_optional), Some(change))
+            let change_percent = row.ratio_quotient().map(|quotient| 100.0 * (quotient - 1.0));
+            let change_text = change_percent
+                .map_or_else(|| format_optional(None), |percent| format!("{percent:+.3} %"));
+            (row.ratios.map(format_optional), Some(change_text))
         });
         let rows = comparison.most_deviating(max_rows, sensitive, SharedRow::gap_deviation_m);
         add_table(format!("greatest changes of the least gap{row_kind}, m"), rows, &|row| {
             let sign = if row.gap_difference_m() > Some(0.0) { "+" } else { "" };
-            let change = format!("{sign}{}", format_optional(row.gap_difference_m()));
-            (row.gaps_m.map(format_optional), Some(change))
+            let change_text = format!("{sign}{}", format_optional(row.gap_difference_m()));
+            (row.gaps_m.map(format_optional), Some(change_text))
         });
     }
-    tables.extend(
+    titled_tables.extend(
         args.fail_on.iter().filter_map(|fail_on| column_table(fail_on, comparison, max_rows)),
     );
-    tables
+    titled_tables
 }
 
 /// Returns the table of the greatest changes of a column that `--fail-on` names.
@@ -230,14 +237,14 @@ fn column_table(
     let column = comparison.changed_columns.iter().find(|column| column.name == *name)?;
     let rows = column.worst_rows.iter().take(max_rows).map(|worst| {
         let [first, second] = worst.values;
-        let change = first.zip(second).map(|(first, second)| second - first);
-        let sign = if change > Some(0.0) { "+" } else { "" };
+        let cell_change = first.zip(second).map(|(first, second)| second - first);
+        let sign = if cell_change > Some(0.0) { "+" } else { "" };
         let key_cells =
             comparison.shared_rows[worst.row].key.iter().map(|value| format_number(*value));
         let value_cells = [
             format_optional(first),
             format_optional(second),
-            format!("{sign}{}", format_optional(change)),
+            format!("{sign}{}", format_optional(cell_change)),
         ];
         key_cells.chain(value_cells).collect()
     });
@@ -344,12 +351,12 @@ fn describe_shift(shift: &BoundaryShift) -> String {
                 .map(|(name, value)| format!("{name} {}", format_number(*value)))
                 .collect();
             let [from, to] = most_shifted.brackets.map(|ends| format_range(ends, format_number));
-            let certain = shift.count_certain_shifts();
+            let certain_shifts = shift.count_certain_shifts();
             let axis_values = axis_values.join(", ");
             format!(
-                "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
-                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {axis_values}: from within \
-                 {from} to within {to}"
+                "{count} along {axis}, {certain_shifts} moved farther than brackets explain; in \
+                 the mean by {least:+.3} to {greatest:+.3} {unit}; farthest at {axis_values}: from \
+                 within {from} to within {to}"
             )
         }
         _ => "no crossing in both".to_owned(),

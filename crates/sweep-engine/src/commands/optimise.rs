@@ -168,25 +168,34 @@ fn find_least_violating<M: Model>(
     let excess_columns: Vec<&str> = excess_columns.iter().map(String::as_str).collect();
     let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
     file.file().each_row(&excess_columns, |row| {
-        let excesses: Vec<f64> =
+        let condition_excesses: Vec<f64> =
             (0..excess_columns.len()).map(|column| row.value(column)).collect();
-        if excesses.iter().all(|excess| excess.is_finite()) {
-            rows.push((row.index(), excesses));
+        if condition_excesses.iter().all(|excess| excess.is_finite()) {
+            rows.push((row.index(), condition_excesses));
         }
         Ok::<(), Error>(())
     })?;
     let greatest_excesses: Vec<f64> = (0..excess_columns.len())
-        .map(|k| rows.iter().map(|(_, excesses)| excesses[k]).fold(f64::MIN_POSITIVE, f64::max))
+        .map(|k| {
+            rows.iter()
+                .map(|(_, condition_excesses)| condition_excesses[k])
+                .fold(f64::MIN_POSITIVE, f64::max)
+        })
         .collect();
-    let relative_violation = |excesses: &[f64]| -> f64 {
-        excesses.iter().zip(&greatest_excesses).map(|(excess, greatest)| excess / greatest).sum()
+    let relative_violation = |condition_excesses: &[f64]| -> f64 {
+        condition_excesses
+            .iter()
+            .zip(&greatest_excesses)
+            .map(|(excess, greatest)| excess / greatest)
+            .sum()
     };
     let least_violated =
         rows.iter().min_by(|a, b| relative_violation(&a.1).total_cmp(&relative_violation(&b.1)));
-    let Some((candidate, excesses)) = least_violated else { return Ok(None) };
+    let Some((candidate, condition_excesses)) = least_violated else { return Ok(None) };
     let mut text = String::new();
     text.line("nearest", format!("candidate {candidate}, which breaks"));
-    for (goal, excess) in study.conditions.iter().zip(excesses).filter(|(_, excess)| **excess > 0.0)
+    for (goal, excess) in
+        study.conditions.iter().zip(condition_excesses).filter(|(_, excess)| **excess > 0.0)
     {
         text.line("", format!("{} by {}", goal.text(), format_number(*excess)));
     }
@@ -200,9 +209,9 @@ fn claim_model_file<'a, M: Model>(
     output: &Path,
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };
-    let refuse = |expected: &str| Err(Error::option("--best", path.display(), expected));
+    let refuse_path = |expected: &str| Err(Error::option("--best", path.display(), expected));
     if M::ABOUT.model_file.is_none() {
-        return refuse("a model with a file of its own");
+        return refuse_path("a model with a file of its own");
     }
     let candidates = study.evolution.candidate_count;
     if let Some(candidate) = args.candidate.filter(|&candidate| candidate >= candidates) {
@@ -214,7 +223,7 @@ fn claim_model_file<'a, M: Model>(
     let resolve_path =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
     if resolve_path(path) == resolve_path(output) {
-        return refuse("another file than that of all candidates");
+        return refuse_path("another file than that of all candidates");
     }
     Ok(Some((path, model_file_output)))
 }
@@ -231,7 +240,7 @@ fn summarise<M: Model>(
 ) -> Result<Exit, Error> {
     let mut text = format!("{}: {search_note}\n", study.name);
     let file = ResultTable::open(output)?;
-    let optimum = file.file().json(key::OPTIMISE).unwrap_or_default();
+    let optimum_json = file.file().json(key::OPTIMISE).unwrap_or_default();
     let parameter_names = parameter_axes(study).iter().map(|axis| &*axis.parameter.name);
     let objective_names = study.objectives.iter().map(|objective| objective.name.as_str());
     let names: Vec<&str> = ["candidate", "feasible", "on_front"]
@@ -239,9 +248,10 @@ fn summarise<M: Model>(
         .chain(parameter_names)
         .chain(objective_names)
         .collect();
-    let best = optimum["best"].as_u64();
-    let chosen_candidate = candidate.or(best);
-    let least_violating = if best.is_none() { find_least_violating(study, &file)? } else { None };
+    let best_candidate = optimum_json["best"].as_u64();
+    let chosen_candidate = candidate.or(best_candidate);
+    let least_violating =
+        if best_candidate.is_none() { find_least_violating(study, &file)? } else { None };
     let mut feasible_count = 0;
     let mut front_cells = Vec::new();
     let mut least_violating_cells = None;
@@ -282,8 +292,8 @@ fn summarise<M: Model>(
         _ => String::new(),
     };
     text.line("feasible", format!("{feasible_count} of {candidate_count}{front_note}"));
-    if let Some(best) = best {
-        text.line("best", format!("candidate {best}"));
+    if let Some(best_candidate) = best_candidate {
+        text.line("best", format!("candidate {best_candidate}"));
     }
     text.extend(least_violating.map(|(_, described)| described));
     if let Some(chosen_values) = chosen_values.as_ref().filter(|_| !study.conditions.is_empty()) {
@@ -291,15 +301,15 @@ fn summarise<M: Model>(
     }
     if least_objective[0].is_finite() && first_of_last_third < candidate_count {
         let Objective { name, sign, .. } = &study.objectives[0];
-        let advice = "; more may take it farther";
+        let more_advice = "; more may take it farther";
         let progress_text = match [least_objective[0], least_objective[0].min(least_objective[1])]
             .map(|value| format_number(sign * value))
         {
             _ if has_several_objectives => {
-                format!("put {late_front_count} of {} on the front{advice}", front_cells.len())
+                format!("put {late_front_count} of {} on the front{more_advice}", front_cells.len())
             }
             [before, after] if before == after => "found none better".to_owned(),
-            [from, to] => format!("took {name} from {from} to {to}{advice}"),
+            [from, to] => format!("took {name} from {from} to {to}{more_advice}"),
         };
         text.line(
             "search",
@@ -333,7 +343,7 @@ fn summarise<M: Model>(
         );
     }
     let listing_interval = front_cells.len().div_ceil(MAX_LISTED_CANDIDATES).max(1);
-    let is_best = |cells: &[Cell]| cells[0].number() == optimum["best"].as_f64();
+    let is_best = |cells: &[Cell]| cells[0].number() == optimum_json["best"].as_f64();
     // The best candidate is always listed, and the nearest one if none is feasible.
     let listed_candidates = front_cells.iter().enumerate();
     let listed_candidates =
@@ -352,8 +362,10 @@ fn summarise<M: Model>(
             .and_then(|chosen_values| format_model_file(study, chosen_values));
         match chosen_candidate.zip(model_file_text) {
             Some((chosen_candidate, model_file_text)) => {
-                let origin = format!("candidate {chosen_candidate} of {}", study.name);
-                file.finish(format!("{MODEL_FILE_START}{origin}\n{model_file_text}").as_bytes())?;
+                let candidate_origin = format!("candidate {chosen_candidate} of {}", study.name);
+                file.finish(
+                    format!("{MODEL_FILE_START}{candidate_origin}\n{model_file_text}").as_bytes(),
+                )?;
                 text.line("wrote", path.display());
             }
             None => {

@@ -71,23 +71,24 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
     let expression_checks = conditions
         .iter()
         .map(|condition| {
-            let whole =
+            let whole_check =
                 check_condition(&file, condition, filter.as_ref(), args.allow_null, max_rows)?;
             let parts =
-                check_parts(&file, condition, filter.as_ref(), args.allow_null, whole.holds)?;
+                check_parts(&file, condition, filter.as_ref(), args.allow_null, whole_check.holds)?;
             Ok(ExpressionCheck {
-                intervals: share_intervals(&whole, is_random),
-                whole_check: whole,
+                intervals: share_intervals(&whole_check, is_random),
+                whole_check,
                 parts,
             })
         })
         .collect::<Result<Vec<ExpressionCheck>, Error>>()?;
-    let holds = expression_checks.iter().all(|expression_check| expression_check.whole_check.holds);
+    let do_all_hold =
+        expression_checks.iter().all(|expression_check| expression_check.whole_check.holds);
     if args.json {
         let json = json!({
             "file": args.file.display().to_string(),
             "where": args.filter,
-            "holds": holds,
+            "holds": do_all_hold,
             "expressions": expression_checks,
         });
         show(&format!("{json:#}\n"))?;
@@ -99,7 +100,7 @@ pub fn run(args: &RequireArgs) -> Result<Exit, Error> {
                 .collect::<String>(),
         )?;
     }
-    Ok(if holds { Exit::Done } else { Exit::ConditionViolated })
+    Ok(if do_all_hold { Exit::Done } else { Exit::ConditionViolated })
 }
 
 /// An expression with the result of its check.

@@ -133,9 +133,10 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
             }
             let tally = tally_rows(&parquet_file)?;
             let limits = ratio_limits(&result.plan).unwrap_or(f64::NAN.into());
-            let locations = extreme_locations(&parquet_file, result, &tally)?;
+            let extreme_values_by_point = extreme_locations(&parquet_file, result, &tally)?;
             let axis_values = |point| {
-                let location = locations.iter().find(|(extreme, _)| *extreme == point);
+                let location =
+                    extreme_values_by_point.iter().find(|(extreme, _)| *extreme == point);
                 location.map_or(String::new(), |(_, values)| {
                     format_named_values(values.iter().map(|(axis, value)| (axis.as_str(), *value)))
                 })
@@ -148,10 +149,10 @@ pub fn run(args: &ShowArgs, model_summary: &ModelSummary<'_>) -> Result<Exit, Er
                 text.line(name, &words);
             }
             if let Some(boundary_settings) = parquet_file.json(key::BOUNDARY) {
-                let quantity = boundary_settings["quantity"].as_str().unwrap_or("unknown");
+                let quantity_name = boundary_settings["quantity"].as_str().unwrap_or("unknown");
                 let limit =
                     boundary_settings["limit"].as_f64().map_or("unknown".to_owned(), format_number);
-                text.line("boundary", describe_limit(quantity, limit));
+                text.line("boundary", describe_limit(quantity_name, limit));
             }
         }
     }

@@ -62,30 +62,33 @@ pub struct Options<'a> {
 impl<'a> Options<'a> {
     /// Parses arguments NAME=VALUE.
     pub fn read(arguments: impl IntoIterator<Item = &'a String>, report: &'a Report) -> Self {
-        let mut written: Vec<NamedArgument<'_>> = Vec::new();
+        let mut named_arguments: Vec<NamedArgument<'_>> = Vec::new();
         for argument in arguments {
             let Some(next) = NamedArgument::read("--set", argument, report) else { continue };
-            match written.iter().find(|earlier| earlier.name.value == next.name.value) {
+            match named_arguments.iter().find(|earlier| earlier.name.value == next.name.value) {
                 Some(first) => report.push(written_twice_mistake(&next.name, &first.name)),
-                None => written.push(next),
+                None => named_arguments.push(next),
             }
         }
-        Self { arguments: written, changes: RefCell::default(), report }
+        Self { arguments: named_arguments, changes: RefCell::default(), report }
     }
 
     /// Returns the value of an option, and records the change if the value differs from
     /// `old_value`.
     fn value(&self, name: &str, kind: &Form<'_>, old_value: &Value) -> Field<Value> {
-        let Some(written) = self.arguments.iter().find(|written| written.name.value == name) else {
+        let Some(written_argument) =
+            self.arguments.iter().find(|written_argument| written_argument.name.value == name)
+        else {
             return Field::Absent;
         };
-        let Some(value) = kind.read_option(written) else { return Field::Rejected };
+        let Some(value) = kind.read_option(written_argument) else { return Field::Rejected };
         if value != *old_value {
             // The change to a list of words has the text of the argument.
-            let change = if value.is_array() { written.value.value.into() } else { value.clone() };
+            let change =
+                if value.is_array() { written_argument.value.value.into() } else { value.clone() };
             self.changes.borrow_mut().push((name.to_owned(), change));
         }
-        Field::Present(Located { value, location: written.value.location.clone() })
+        Field::Present(Located { value, location: written_argument.value.location.clone() })
     }
 }
 
@@ -270,14 +273,14 @@ impl<'a> Keys<'a> {
         &mut self,
         key: Key<'_>,
         noun: &'static str,
-        all: &[T],
+        choices: &[T],
         name: fn(T) -> &'static str,
         value: &mut Vec<T>,
     ) -> Field<()> {
-        let names: Vec<&str> = all.iter().copied().map(name).collect();
+        let names: Vec<&str> = choices.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|item| name(*item).to_owned()).collect();
         let field = self.walk_key(key, &Form::Words(noun, &names), &mut words);
-        let find_by_name = |word: &String| all.iter().copied().find(|item| name(*item) == word);
+        let find_by_name = |word: &String| choices.iter().copied().find(|item| name(*item) == word);
         *value = words.iter().filter_map(find_by_name).collect();
         field
     }

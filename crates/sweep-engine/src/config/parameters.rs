@@ -102,9 +102,9 @@ pub fn find_parameter<M: Model>(
     name: &Located<&str>,
     draft: &Draft<'_, M>,
 ) -> Option<ModelParameter<M>> {
-    let refuse =
+    let report_unknown =
         |error| draft.report.push_with(|_| unknown_parameter(name, &error, &draft.plan.model));
-    draft.plan.model.find(name.value).map_err(refuse).ok()
+    draft.plan.model.find(name.value).map_err(report_unknown).ok()
 }
 
 /// Returns the mistake of a name that is no parameter.

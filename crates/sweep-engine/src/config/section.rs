@@ -330,8 +330,8 @@ impl<'a> Section<'a> {
     }
 
     /// Reads the number under a name from [`Section::names`].
-    pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
-        self.parse_number(&quote(name), self.table.get(name)?, range)
+    pub fn number_named(&self, key_name: &str, range: Range) -> Option<Located<f64>> {
+        self.parse_number(&quote(key_name), self.table.get(key_name)?, range)
     }
 
     /// Reads the string under a name from [`Section::names`].

@@ -202,8 +202,9 @@ fn check_window(
     let &[from, to] = window_edges else { return None };
     let [from_text, to_text] = [from, to].map(decimal);
     if from >= to {
-        let adjective = if from > to { "reversed" } else { "empty" };
-        let title = format!("the window is {adjective}: it goes from {from_text} s to {to_text} s");
+        let window_defect = if from > to { "reversed" } else { "empty" };
+        let title =
+            format!("the window is {window_defect}: it goes from {from_text} s to {to_text} s");
         return report.refuse(location, title, "expected [from, to] with from < to");
     }
     if let Some(end) = end.filter(|end| to > end.value) {

@@ -59,12 +59,12 @@ struct SourceText {
 /// The system's error, or the reason why the file is no text.
 pub fn read_text_file(path: &Path) -> io::Result<String> {
     let bytes = regular::read_text(path, MAX_TEXT_BYTES + 1)?;
-    let refuse = |reason: String| Err(io::Error::other(reason));
+    let refuse_content = |reason: String| Err(io::Error::other(reason));
     if bytes.starts_with(b"PAR1") {
-        return refuse("it is a Parquet file, not text: `sweep show` reads it".to_owned());
+        return refuse_content("it is a Parquet file, not text: `sweep show` reads it".to_owned());
     }
     if bytes.len() as u64 > MAX_TEXT_BYTES {
-        return refuse(format!(
+        return refuse_content(format!(
             "it is longer than {} KiB: give values as a range, or points as a list in a file of \
              their own",
             MAX_TEXT_BYTES >> 10
@@ -72,11 +72,11 @@ pub fn read_text_file(path: &Path) -> io::Result<String> {
     }
     String::from_utf8(bytes).or_else(|error| match error.as_bytes() {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
-            refuse("it is UTF-16, not UTF-8: save it as UTF-8".to_owned())
+            refuse_content("it is UTF-16, not UTF-8: save it as UTF-8".to_owned())
         }
         _ => {
             let byte = error.utf8_error().valid_up_to() + 1;
-            refuse(format!("it is not UTF-8 text: the first bad byte is number {byte}"))
+            refuse_content(format!("it is not UTF-8 text: the first bad byte is number {byte}"))
         }
     })
 }

@@ -88,16 +88,17 @@ pub fn evolve<E>(
         seed,
     } = *evolution;
     let mut evaluated_candidates: Vec<Candidate> = Vec::new();
-    let mut members: Vec<usize> = Vec::new();
+    let mut member_indices: Vec<usize> = Vec::new();
     for generation in 0.. {
         let generation_size = population.min(candidates - evaluated_candidates.len() as u64);
         if generation_size == 0 {
             break;
         }
         let first_trial = evaluated_candidates.len();
-        let ranks = CandidateRanking::new(&evaluated_candidates, objectives);
-        let choose_better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
-        let best_member = members.iter().copied().reduce(choose_better);
+        let ranking = CandidateRanking::new(&evaluated_candidates, objectives);
+        let choose_better =
+            |a, b| if ranking.compare(b, a) == Some(Ordering::Less) { b } else { a };
+        let best_member = member_indices.iter().copied().reduce(choose_better);
         let initial_design =
             Design::Spread { rule: DesignRule::LatinHypercube, points: generation_size, seed };
         let trial_position = |k: u64| -> Vec<f64> {
@@ -111,7 +112,7 @@ pub fn evolve<E>(
                 .filter(|_| objectives == 1 && trial_number >= evolution.first_of_last_third());
             create_trial(
                 &evaluated_candidates,
-                &members,
+                &member_indices,
                 (k as usize, start_candidate),
                 trial_number,
                 evolution,
@@ -126,20 +127,24 @@ pub fn evolve<E>(
             generation,
         }));
         if generation == 0 {
-            members = (0..evaluated_candidates.len()).collect();
+            member_indices = (0..evaluated_candidates.len()).collect();
             continue;
         }
-        let ranks = CandidateRanking::new(&evaluated_candidates, objectives);
-        let mut survivors = Vec::with_capacity(2 * members.len());
-        for (k, &member) in members.iter().enumerate() {
-            let trial = Some(first_trial + k).filter(|&trial| trial < evaluated_candidates.len());
-            match trial.map(|trial| (trial, ranks.compare(trial, member))) {
-                Some((trial, Some(Ordering::Less | Ordering::Equal))) => survivors.push(trial),
-                Some((trial, None)) => survivors.extend([member, trial]),
-                Some((_, Some(Ordering::Greater))) | None => survivors.push(member),
+        let ranking = CandidateRanking::new(&evaluated_candidates, objectives);
+        let mut surviving_indices = Vec::with_capacity(2 * member_indices.len());
+        for (k, &member) in member_indices.iter().enumerate() {
+            let trial_index = Some(first_trial + k)
+                .filter(|&trial_index| trial_index < evaluated_candidates.len());
+            match trial_index.map(|trial_index| (trial_index, ranking.compare(trial_index, member)))
+            {
+                Some((trial_index, Some(Ordering::Less | Ordering::Equal))) => {
+                    surviving_indices.push(trial_index)
+                }
+                Some((trial_index, None)) => surviving_indices.extend([member, trial_index]),
+                Some((_, Some(Ordering::Greater))) | None => surviving_indices.push(member),
             }
         }
-        members = ranks.select_best(survivors, population as usize);
+        member_indices = ranking.select_best(surviving_indices, population as usize);
     }
     Ok(evaluated_candidates)
 }
@@ -148,7 +153,7 @@ pub fn evolve<E>(
 /// numbers; `start_candidate` is the best candidate, if the trial starts from it.
 fn create_trial(
     candidates: &[Candidate],
-    members: &[usize],
+    member_indices: &[usize],
     (member, start_candidate): (usize, Option<usize>),
     trial_number: u64,
     evolution: &Evolution,
@@ -166,11 +171,11 @@ fn create_trial(
     let mut chosen_members = [member; 4];
     for k in 1..4 {
         while chosen_members[..k].contains(&chosen_members[k]) {
-            chosen_members[k] = (draw_number() * members.len() as f64) as usize;
+            chosen_members[k] = (draw_number() * member_indices.len() as f64) as usize;
         }
     }
     let [member_position, base_position, plus_position, minus_position] =
-        chosen_members.map(|other| candidates[members[other]].position.as_slice());
+        chosen_members.map(|other| candidates[member_indices[other]].position.as_slice());
     let difference_factor = DIFFERENCE_FACTOR_RANGE[0]
         + (DIFFERENCE_FACTOR_RANGE[1] - DIFFERENCE_FACTOR_RANGE[0]) * draw_number();
     let (base_position, difference_factor) = start_candidate
@@ -193,12 +198,12 @@ fn create_trial(
 
 /// Returns the Pareto front: the feasible candidates that no other one dominates.
 pub fn find_pareto_front(candidates: &[Candidate], objectives: usize) -> Vec<usize> {
-    let ranks = CandidateRanking::new(candidates, objectives);
+    let ranking = CandidateRanking::new(candidates, objectives);
     let feasible_candidates =
         (0..candidates.len()).filter(|&k| candidates[k].is_feasible(objectives));
     let feasible_candidates: Vec<usize> = feasible_candidates.collect();
     let is_dominated = |k: usize| {
-        feasible_candidates.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less))
+        feasible_candidates.iter().any(|&other| ranking.compare(other, k) == Some(Ordering::Less))
     };
     feasible_candidates.iter().copied().filter(|&k| !is_dominated(k)).collect()
 }

@@ -79,9 +79,9 @@ pub fn compute_slacks<M: Model>(
     let found_slacks = Mutex::new(Vec::new());
     let record_slacks = |_: usize, points: Vec<PointRows>| -> Result<RequestValues, StoreError> {
         let batch = collect_batch(study, &layout, values, points)?;
-        let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
+        let slack_results = study.conditions.iter().map(|goal| goal.slack(&batch));
         *lock(&found_slacks) =
-            slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(row_defect)?;
+            slack_results.collect::<Result<Vec<_>, ArrowError>>().map_err(row_defect)?;
         Ok(RequestValues::new())
     };
     let keys = [trial_key(0, values)];

@@ -97,16 +97,18 @@ impl<M: Model> Study<M> {
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
         let name = read_name(&root, path, None, "add `name = \"...\"`, or rename the file");
-        let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY_KEYS;
-        let grid = root.require(root.text(grid), grid, "a grid file, relative to this file");
-        let input =
-            grid.map(|grid| GridInput::file(resolve_beside(path, grid.value), sets.to_vec()));
+        let [_, grid_key, parameter, population, candidates, seed, objective, conditions] =
+            STUDY_KEYS;
+        let grid_file =
+            root.require(root.text(grid_key), grid_key, "a grid file, relative to this file");
+        let input = grid_file
+            .map(|grid_file| GridInput::file(resolve_beside(path, grid_file.value), sets.to_vec()));
         let mut draft = input.and_then(|input| read_draft::<M>(&input, report));
-        let grid = draft.as_ref().map(|draft| draft.plan.clone());
+        let grid_plan = draft.as_ref().map(|draft| draft.plan.clone());
         if let Some(draft) = &mut draft {
             convert_axes_to_ranges(&mut draft.plan);
         }
-        let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
+        let design = grid_plan.as_ref().and_then(|grid_plan| grid_plan.design.as_ref());
         let parameters = read_parameters(&root, root.tables(parameter), design, &mut draft);
         let population = root.whole_number(population, &(4..=MAX_CANDIDATES)).or_default(0);
         let candidates = root.whole_number(candidates, &(1..=MAX_CANDIDATES)).or_default(0);
@@ -126,7 +128,7 @@ impl<M: Model> Study<M> {
             axes.iter().map(|axis| axis.parameter.name.to_string()).collect();
         let known_columns =
             plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
-        let rows_per_candidate = grid.as_ref().map_or(1, Plan::points);
+        let rows_per_candidate = grid_plan.as_ref().map_or(1, Plan::points);
         if rows_per_candidate > MAX_ROWS {
             let title = format!("a grid of {rows_per_candidate} points for every candidate");
             report.refuse::<()>(root.location(), title, format!("expected at most {}", MAX_ROWS));
@@ -145,7 +147,7 @@ impl<M: Model> Study<M> {
             conditions.filter_map(|text| goals.read(&text, Goal::constraint)).collect();
         root.finish();
         let mut plan = plan?;
-        let grid = grid?;
+        let grid_plan = grid_plan?;
         let seed = seed?;
         plan.name.clone_from(&name);
         let evolution = Evolution {
@@ -155,7 +157,7 @@ impl<M: Model> Study<M> {
             candidate_count: candidates,
             seed,
         };
-        Some(Self { name, plan, grid, parameters, objectives, conditions, evolution })
+        Some(Self { name, plan, grid: grid_plan, parameters, objectives, conditions, evolution })
     }
 
     /// Returns the number of responses of a candidate: objectives and constraint violations.
@@ -204,8 +206,8 @@ impl<M: Model> Study<M> {
     /// Returns the study's settings beside the plan, as JSON.
     pub fn settings_json(&self) -> Value {
         let objective_json = |objective: &Objective| {
-            let verb = if objective.sign > 0.0 { "minimise" } else { "maximise" };
-            json!({ "name": objective.name, verb: objective.goal.text() })
+            let verb_key = if objective.sign > 0.0 { "minimise" } else { "maximise" };
+            json!({ "name": objective.name, verb_key: objective.goal.text() })
         };
         let objectives = self.objectives.iter().map(objective_json);
         let tolerances = self.parameters.iter().map(|parameter| parameter.tolerance);
@@ -257,7 +259,7 @@ fn read_parameters<M: Model>(
         let range = found_parameter.as_ref().map_or(Range::Any, |parameter| parameter.range);
         section
             .mark_misplaced(&["count"], "the study has `candidates`, and finds the values itself");
-        let bounds = read_range(section, range, Some(2));
+        let parameter_bounds = read_range(section, range, Some(2));
         let spread_tolerance = match tolerance {
             Field::Present(tolerance_field) if tolerance_field.value >= 1.0 => {
                 let title = "a tolerance of the whole value or more";
@@ -280,8 +282,8 @@ fn read_parameters<M: Model>(
             Field::Present(tolerance_field) => Some(tolerance_field.value),
             _ => Some(0.0),
         };
-        let (Some(name), Some(parameter), Some(bounds), Some(tolerance), Some(draft)) =
-            (name, found_parameter, bounds, spread_tolerance, draft.as_mut())
+        let (Some(name), Some(parameter), Some(parameter_bounds), Some(tolerance), Some(draft)) =
+            (name, found_parameter, parameter_bounds, spread_tolerance, draft.as_mut())
         else {
             continue;
         };
@@ -304,8 +306,11 @@ fn read_parameters<M: Model>(
             report.push(written_twice_mistake(&name, &first));
             continue;
         }
-        let mut axis =
-            crate::plan::Axis { parameter, values: bounds.value.clone(), tolerance: None };
+        let mut axis = crate::plan::Axis {
+            parameter,
+            values: parameter_bounds.value.clone(),
+            tolerance: None,
+        };
         if let AxisValues::Linear { from, to, .. } | AxisValues::Log { from, to, .. } =
             &mut axis.values
         {
@@ -314,7 +319,7 @@ fn read_parameters<M: Model>(
             *high += tolerance * high.abs();
         }
         add_axis(axis, location, draft);
-        searched_parameters.push(SearchedParameter { bounds: bounds.value, tolerance });
+        searched_parameters.push(SearchedParameter { bounds: parameter_bounds.value, tolerance });
     }
     searched_parameters
 }

@@ -97,9 +97,9 @@ impl Lock {
 
     /// Returns a note for the user if the file system has no locks.
     pub fn note_missing_locks(&self, folder: &Folder) -> Option<String> {
-        let warning =
+        let lock_warning =
             "is on a file system without locks: make sure that nothing else runs on this output";
-        self.is_unsupported.then(|| format!("{} {warning}", folder.path.display()))
+        self.is_unsupported.then(|| format!("{} {lock_warning}", folder.path.display()))
     }
 
     /// Deletes the lock's file, so that no process can take the lock over, and then releases the

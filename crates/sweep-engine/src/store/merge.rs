@@ -109,13 +109,13 @@ impl OpenRun {
     pub fn join(
         &mut self,
         job: &Job<'_>,
-        stop: &dyn Fn() -> bool,
+        must_stop: &dyn Fn() -> bool,
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.folder.output.clone();
         let file = atomic::create_temporary(&self.folder.path)?;
         let mut writer = ResultWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunk_count() {
-            if stop() {
+            if must_stop() {
                 return Ok(None);
             }
             let Some(batches) =

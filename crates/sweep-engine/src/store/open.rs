@@ -443,19 +443,19 @@ pub(super) fn open_result_of_same_plan(
 
 /// Returns the difference between the columns of two builds for the same plan, if there is one.
 fn find_column_difference(older: &Schema, present: &Schema) -> Option<PlanDifference> {
-    let [older, present] = [older, present].map(|schema| -> Vec<&str> {
+    let [older_names, present_names] = [older, present].map(|schema| -> Vec<&str> {
         schema.fields().iter().map(|field| field.name().as_str()).collect()
     });
     let names_without = |names: &[&str], others: &[&str]| {
-        let mut remaining = names.to_vec();
-        remaining.retain(|name| !others.contains(name));
-        (!remaining.is_empty()).then(|| remaining.join(", "))
+        let mut remaining_names = names.to_vec();
+        remaining_names.retain(|name| !others.contains(name));
+        (!remaining_names.is_empty()).then(|| remaining_names.join(", "))
     };
     let pointer = "/columns".to_owned();
-    (older != present).then(|| PlanDifference {
+    (older_names != present_names).then(|| PlanDifference {
         pointer,
-        older_value: names_without(&older, &present),
-        present_value: names_without(&present, &older),
+        older_value: names_without(&older_names, &present_names),
+        present_value: names_without(&present_names, &older_names),
     })
 }
 

@@ -180,12 +180,14 @@ impl Part<'_> {
     pub(super) fn read_cells(&self, columns: &[usize]) -> Result<Vec<RowCells>, PartError> {
         let mut rows = Vec::new();
         for batch in self.read_batches(columns.to_vec())? {
-            let first = rows.len();
-            rows.resize_with(first + batch.num_rows(), || RowCells::with_capacity(columns.len()));
+            let first_row = rows.len();
+            rows.resize_with(first_row + batch.num_rows(), || {
+                RowCells::with_capacity(columns.len())
+            });
             for (column, array) in columns.iter().zip(batch.columns()) {
                 let column = &self.schema.columns[*column];
                 let cells = column.cells_from_array(array).ok_or(PartDamage::Rows)?;
-                rows[first..].iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
+                rows[first_row..].iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
             }
         }
         Ok(rows)

@@ -69,8 +69,8 @@ impl PointParts {
 
     /// Returns the points of a chunk.
     pub(super) fn chunk_range(&self, chunk: u64) -> Range<u64> {
-        let first = chunk.saturating_mul(self.chunk_points).min(self.points);
-        first..first.saturating_add(self.chunk_points).min(self.points)
+        let first_point = chunk.saturating_mul(self.chunk_points).min(self.points);
+        first_point..first_point.saturating_add(self.chunk_points).min(self.points)
     }
 
     /// Returns the chunk that a point is in.

@@ -138,7 +138,7 @@ impl ShardLayout {
 /// [`StoreError::Refused`] if the request, the scheduler and the stored division contradict each
 /// other.
 pub(super) fn resolve_shard(
-    request: Option<ShardRequest>,
+    shard_request: Option<ShardRequest>,
     environment: Environment<'_>,
     stored_layout: Option<ShardLayout>,
 ) -> Result<Option<(Shard, ShardLayout)>, StoreError> {
@@ -149,7 +149,7 @@ pub(super) fn resolve_shard(
              {requested_count}\n  = help: use --shard {help}"
         ))
     };
-    if let Some(ShardRequest::Given(shard)) = request {
+    if let Some(ShardRequest::Given(shard)) = shard_request {
         let layout =
             stored_layout.unwrap_or(ShardLayout { shards: shard.count, first_array_id: 1 });
         let shards = layout.shards;
@@ -159,7 +159,7 @@ pub(super) fn resolve_shard(
         }
         return Ok(Some((shard, layout)));
     }
-    let requested_count = request
+    let requested_count = shard_request
         .map(|(ShardRequest::Auto { count } | ShardRequest::Given(Shard { count, .. }))| count);
     let Some(scheduler) = SchedulerTask::read(environment)? else {
         return match requested_count {
@@ -258,7 +258,7 @@ pub fn format_numbers(numbers: impl IntoIterator<Item = u64>) -> String {
 mod tests {
     use super::*;
 
-    fn environment(
+    fn environment_of(
         pairs: &'static [(&'static str, &'static str)],
     ) -> impl Fn(&str) -> Option<String> {
         move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
@@ -304,12 +304,12 @@ mod tests {
 
     #[test]
     fn without_option_and_scheduler_the_whole_run_is_computed() {
-        assert_eq!(resolve_shard(None, &environment(&[]), None).unwrap(), None);
+        assert_eq!(resolve_shard(None, &environment_of(&[]), None).unwrap(), None);
     }
 
     #[test]
     fn a_slurm_array_numbers_the_shards_from_its_first_task() {
-        let zero_based_array = environment(&[
+        let zero_based_array = environment_of(&[
             ("SLURM_ARRAY_TASK_ID", "2"),
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "8"),
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn resubmitted_tasks_keep_the_numbers_of_the_first_array() {
-        let resubmitted_array = environment(&[
+        let resubmitted_array = environment_of(&[
             ("SLURM_ARRAY_TASK_ID", "7"),
             ("SLURM_ARRAY_TASK_MIN", "3"),
             ("SLURM_ARRAY_TASK_COUNT", "2"),
@@ -334,7 +334,7 @@ mod tests {
 
     #[test]
     fn a_task_whose_number_is_outside_the_array_is_refused() {
-        let array_with_gaps = environment(&[
+        let array_with_gaps = environment_of(&[
             ("SLURM_ARRAY_TASK_ID", "20"),
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "3"),
@@ -347,16 +347,16 @@ mod tests {
 
     #[test]
     fn kubernetes_gives_the_index_and_the_option_the_count() {
-        let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "0")]);
+        let kubernetes = environment_of(&[("JOB_COMPLETION_INDEX", "0")]);
         let (shard, _) = resolve_shard(Some(ShardRequest::Auto { count: 4 }), &kubernetes, None)
             .unwrap()
             .unwrap();
         assert_eq!(shard, Shard { index: 1, count: 4 });
         assert!(refusal_message(resolve_shard(None, &kubernetes, None)).contains("auto/N"));
         let without_scheduler =
-            resolve_shard(Some(ShardRequest::Auto { count: 4 }), &environment(&[]), None);
+            resolve_shard(Some(ShardRequest::Auto { count: 4 }), &environment_of(&[]), None);
         assert!(refusal_message(without_scheduler).contains("--shard I/4"));
-        let invalid_id = environment(&[("SLURM_ARRAY_TASK_ID", "x")]);
+        let invalid_id = environment_of(&[("SLURM_ARRAY_TASK_ID", "x")]);
         assert!(refusal_message(resolve_shard(None, &invalid_id, None)).contains("not a number"));
     }
 
@@ -365,10 +365,10 @@ mod tests {
         let stored_layout = Some(ShardLayout { shards: 4, first_array_id: 1 });
         let requested_shard = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
         assert!(
-            refusal_message(resolve_shard(requested_shard, &environment(&[]), stored_layout))
+            refusal_message(resolve_shard(requested_shard, &environment_of(&[]), stored_layout))
                 .contains("into 4 shards")
         );
-        let kubernetes = environment(&[("JOB_COMPLETION_INDEX", "1")]);
+        let kubernetes = environment_of(&[("JOB_COMPLETION_INDEX", "1")]);
         assert!(
             refusal_message(resolve_shard(
                 Some(ShardRequest::Auto { count: 8 }),

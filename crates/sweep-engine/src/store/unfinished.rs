@@ -117,8 +117,8 @@ impl UnfinishedWork {
         let points_done = self.points_done;
         match self.points {
             Some(points) => {
-                let percent = 100.0 * points_done as f64 / points.max(1) as f64;
-                format!("{points_done} of {points} points done ({percent:.1} %)")
+                let done_percent = 100.0 * points_done as f64 / points.max(1) as f64;
+                format!("{points_done} of {points} points done ({done_percent:.1} %)")
             }
             None => format!("{points_done} trials of a search kept"),
         }

@@ -27,8 +27,8 @@ impl RowStretch {
 
     /// Returns the width of the part that lies beside another on the same side.
     fn common_width(&self, other: &Self) -> f64 {
-        let common = self.to.min(other.to) - self.from.max(other.from);
-        if self.is_reliable == other.is_reliable { common } else { f64::NEG_INFINITY }
+        let shared_width = self.to.min(other.to) - self.from.max(other.from);
+        if self.is_reliable == other.is_reliable { shared_width } else { f64::NEG_INFINITY }
     }
 }
 
@@ -173,7 +173,7 @@ fn traced_stretches(row: &BoundaryRow) -> Vec<RowStretch> {
 fn common_stretches(sides: &[Vec<bool>], rows: usize) -> Vec<(usize, Vec<RowStretch>)> {
     let mut stretches_by_row = Vec::new();
     for (first, row_window) in sides.windows(rows).enumerate() {
-        let mut common = Vec::new();
+        let mut stretches_on_side = Vec::new();
         for is_reliable in [false, true] {
             let is_on_side: Vec<bool> = (0..=sample_intervals())
                 .map(|k| row_window.iter().all(|row| row[k] == is_reliable))
@@ -184,14 +184,18 @@ fn common_stretches(sides: &[Vec<bool>], rows: usize) -> Vec<(usize, Vec<RowStre
                 let is_stretch = is_on_side.get(k).copied().unwrap_or(false);
                 if let Some(start) = start_sample.filter(|_| !is_stretch) {
                     let to = sample_position(k - 1);
-                    common.push(RowStretch { from: sample_position(start), to, is_reliable });
+                    stretches_on_side.push(RowStretch {
+                        from: sample_position(start),
+                        to,
+                        is_reliable,
+                    });
                     start_sample = None;
                 } else if is_stretch && start_sample.is_none() {
                     start_sample = Some(k);
                 }
             }
         }
-        stretches_by_row.push((first, common));
+        stretches_by_row.push((first, stretches_on_side));
     }
     stretches_by_row
 }

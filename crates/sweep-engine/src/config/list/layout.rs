@@ -100,9 +100,9 @@ impl<'t> Iterator for LineCells<'t> {
         let trimmed_cell = cell.trim();
         let is_quoted =
             trimmed_cell.len() >= 2 && trimmed_cell.starts_with('"') && trimmed_cell.ends_with('"');
-        let unquoted =
+        let unquoted_cell =
             if is_quoted { &trimmed_cell[1..trimmed_cell.len() - 1] } else { trimmed_cell };
-        Some((unquoted, start..start + trimmed_cell.len()))
+        Some((unquoted_cell, start..start + trimmed_cell.len()))
     }
 }
 
@@ -293,14 +293,14 @@ fn find_commented_header<'t>(
     let line = TextLine::starting_at(text, start);
     let name_text = line.text.trim_start().strip_prefix('#')?;
     let offset = line.text_start + line.text.len() - name_text.len();
-    let header = TextLine { line_start: start, text: name_text, text_start: offset };
-    let separator = separator(&header);
-    let column_count = split_cells(header, separator)?.len();
+    let name_line = TextLine { line_start: start, text: name_text, text_start: offset };
+    let separator = separator(&name_line);
+    let column_count = split_cells(name_line, separator)?.len();
     let row_cells = split_cells(row, separator)?;
     let is_row = row_cells.len() == column_count && row_cells.into_iter().all(is_number);
     is_row.then_some(TableLayout {
         separator,
-        header_line: header,
+        header_line: name_line,
         units: Vec::new(),
         stated_notation: None,
         rows_start: row.line_start,

@@ -87,8 +87,9 @@ fn foreign_files_are_kept_under_any_name() {
             let remaining_names = file_names(&test_folder);
             assert_eq!(remaining_names.len(), RUN_LIKE_FILE_NAMES.len(), "{remaining_names:?}");
             for name in remaining_names {
-                let content = fs::read_to_string(test_folder.partial_folder().join(&name)).unwrap();
-                assert_eq!(content, foreign_text, "{name}");
+                let file_text =
+                    fs::read_to_string(test_folder.partial_folder().join(&name)).unwrap();
+                assert_eq!(file_text, foreign_text, "{name}");
             }
             assert_eq!(
                 fs::read(test_folder.result_path()).unwrap(),
