@@ -128,7 +128,7 @@ impl<T> AnyLaneFlag<T> {
 
     /// Returns whether the flag is set for any machine.
     #[inline(always)]
-    pub(crate) fn is_set(self) -> bool {
+    pub(crate) fn is_set(&self) -> bool {
         self.0
     }
 }
