@@ -16,25 +16,27 @@ use washer_model::{
 
 /// Number of trajectories of a kernel. Basis: the number of lanes of AVX-512. Doubling it takes two
 /// passes of the widest kernel.
-const TRAJECTORIES: usize = 8;
+const TRAJECTORY_COUNT: usize = 8;
 
 /// Step (s) of the kernels. Basis: it is stable on the paper's machine. Doubling it is not.
 const STEP_S: f64 = 2.5e-4;
 
 /// Number of rounds, of which medians are reported. Doubling it doubles the time.
-const ROUNDS: usize = 5;
+const DEFAULT_ROUNDS: usize = 5;
 
 fn main() {
     // Cargo adds the argument `--bench`, which is not a number.
-    let rounds =
-        std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
-    trajectories(rounds);
-    let once_s = methods(rounds);
-    threads(rounds, once_s);
-    boundaries(rounds);
-    dwells(rounds, once_s / 1287.0);
-    motions(rounds);
-    elements(rounds);
+    let rounds = std::env::args()
+        .skip(1)
+        .find_map(|argument| argument.parse().ok())
+        .unwrap_or(DEFAULT_ROUNDS);
+    measure_trajectories(rounds);
+    let coarsest_level_s = measure_methods(rounds);
+    measure_threads(rounds, coarsest_level_s);
+    measure_boundaries(rounds);
+    measure_responses(rounds, coarsest_level_s / 1287.0);
+    measure_motions(rounds);
+    measure_elements(rounds);
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -47,12 +49,12 @@ fn median(values: &[f64]) -> f64 {
 /// greatest relative distance of a round from its median.
 fn print_table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
     let medians: Vec<f64> = rounds.iter().map(|values| median(values)).collect();
-    let farthest = rounds
+    let greatest_deviation = rounds
         .iter()
         .zip(&medians)
         .flat_map(|(values, median)| values.iter().map(move |value| (value / median - 1.0).abs()))
         .fold(0.0, f64::max);
-    println!("| {unit}, rounds within {:.0} % | |\n|---|---|", 1e2 * farthest);
+    println!("| {unit}, rounds within {:.0} % | |\n|---|---|", 1e2 * greatest_deviation);
     for (subject, median) in subjects.iter().zip(&medians) {
         println!("| {subject} | {median:.3} |");
     }
@@ -61,13 +63,13 @@ fn print_table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64>
 }
 
 /// Measures trajectories of both models on one core, with every instruction set.
-fn trajectories(rounds: usize) {
+fn measure_trajectories(rounds: usize) {
     let scenario = (
         Machine::paper(),
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
     );
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
-    let points: Vec<Point> = prepare(Simd::widest(), &vec![scenario; TRAJECTORIES], &timing)
+    let points: Vec<Point> = prepare(Simd::widest(), &vec![scenario; TRAJECTORY_COUNT], &timing)
         .into_iter()
         .map(|point| point.expect("the paper's machine has an equilibrium"))
         .collect();
@@ -81,17 +83,19 @@ fn trajectories(rounds: usize) {
     let mut times = vec![Vec::new(); subjects.len()];
     for _ in 0..rounds {
         for (&(simd, _, model), times) in subjects.iter().zip(&mut times) {
-            let begin = Instant::now();
+            let start_instant = Instant::now();
             let records = simulate(simd, model, &Method::rk4(STEP_S), &points);
-            times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);
+            times.push(start_instant.elapsed().as_secs_f64() * 1e3 / TRAJECTORY_COUNT as f64);
             assert!(records.iter().all(|record| record.failure.is_none()));
         }
     }
-    println!("One core, {TRAJECTORIES} trajectories of 50 s by RK4 at {STEP_S:e} s, with peaks:\n");
+    println!(
+        "One core, {TRAJECTORY_COUNT} trajectories of 50 s by RK4 at {STEP_S:e} s, with peaks:\n"
+    );
     let names: Vec<_> =
         subjects.iter().map(|(simd, name, _)| format!("{name}, {}", simd.name())).collect();
     let medians = print_table("ms a trajectory", &names, &times);
-    let of = |simd: Simd, name: &str| {
+    let median_ms = |simd: Simd, name: &str| {
         subjects
             .iter()
             .position(|subject| subject.0 == simd && subject.1 == name)
@@ -100,7 +104,9 @@ fn trajectories(rounds: usize) {
     println!("| ratio | |\n|---|---|");
     for (name, _) in models {
         for simd in available.iter().filter(|simd| **simd != Simd::Scalar) {
-            if let (Some(wide), Some(scalar)) = (of(*simd, name), of(Simd::Scalar, name)) {
+            if let (Some(wide), Some(scalar)) =
+                (median_ms(*simd, name), median_ms(Simd::Scalar, name))
+            {
                 println!("| {name}: {} against scalar | {:.2} |", simd.name(), scalar / wide);
             }
         }
@@ -110,7 +116,7 @@ fn trajectories(rounds: usize) {
 
 /// Measures plain steps and the fast method on one core, on the whole grid of Fig. 12. Returns the
 /// time (s) of a trajectory of each model by the fast method at 1e-3.
-fn methods(rounds: usize) -> f64 {
+fn measure_methods(rounds: usize) -> f64 {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
     let end_s = 50.0;
     let window_s = [30.0, 50.0];
@@ -134,12 +140,14 @@ fn methods(rounds: usize) -> f64 {
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
     let steps = StepSelector::new(corners, end_s);
     let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
-    let capped = models.map(|(_, model)| {
+    let capped_methods = models.map(|(_, model)| {
         let step_s = steps.capped_step_s(model).expect("the paper's machine has modes");
         capped_method(model, MethodKind::Capped0, step_s.expect("its bearings are stiff"))
     });
-    let methods =
-        [(format!("rk4, {STEP_S:e} s"), [Method::rk4(STEP_S); 2]), ("capped_0".to_owned(), capped)];
+    let methods = [
+        (format!("rk4, {STEP_S:e} s"), [Method::rk4(STEP_S); 2]),
+        ("capped_0".to_owned(), capped_methods),
+    ];
     let subjects: Vec<_> = methods
         .iter()
         .flat_map(|(name, by_model)| {
@@ -153,9 +161,9 @@ fn methods(rounds: usize) -> f64 {
     let mut times = vec![Vec::new(); subjects.len()];
     for _ in 0..rounds {
         for ((_, model, method), times) in subjects.iter().zip(&mut times) {
-            let begin = Instant::now();
+            let start_instant = Instant::now();
             let records = simulate(Simd::widest(), *model, method, &points);
-            times.push(begin.elapsed().as_secs_f64());
+            times.push(start_instant.elapsed().as_secs_f64());
             assert!(records.iter().all(|record| record.failure.is_none()));
         }
     }
@@ -178,19 +186,19 @@ fn methods(rounds: usize) -> f64 {
     medians[2] + medians[3]
 }
 
-const FIG12: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
+const FIG12_PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
 
 /// Returns the time (s) that the program takes with these arguments, in a folder for its output.
-fn program_s(folder: &Path, arguments: &[&str]) -> f64 {
-    let begin = Instant::now();
-    let run = Command::new(env!("CARGO_BIN_EXE_sweep"))
+fn measure_program_s(folder: &Path, arguments: &[&str]) -> f64 {
+    let start_instant = Instant::now();
+    let output = Command::new(env!("CARGO_BIN_EXE_sweep"))
         .args(arguments)
         .args(["--fresh", "--progress", "none", "--out"])
         .arg(folder.join(format!("{}.parquet", arguments[0])))
         .output();
-    let took_s = begin.elapsed().as_secs_f64();
-    let run = run.expect("the sweep program starts");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let took_s = start_instant.elapsed().as_secs_f64();
+    let output = output.expect("the sweep program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     took_s
 }
 
@@ -200,9 +208,9 @@ fn temporary_folder() -> tempfile::TempDir {
 }
 
 /// Measures the grid of Fig. 12 and its boundary with each criterion.
-fn boundaries(rounds: usize) {
+fn measure_boundaries(rounds: usize) {
     let folder = temporary_folder();
-    let text = std::fs::read_to_string(FIG12).expect("the grid file of Fig. 12");
+    let text = std::fs::read_to_string(FIG12_PATH).expect("the grid file of Fig. 12");
     let criteria = ["peak", "rms", "envelope"].map(|criterion| {
         let path = folder.path().join(format!("{criterion}.toml"));
         let reliability = format!("[reliability]\ncriterion = \"{criterion}\"");
@@ -215,7 +223,7 @@ fn boundaries(rounds: usize) {
         for (i, (_, path)) in criteria.iter().enumerate() {
             let path = path.to_str().expect("a path in Unicode");
             for (k, command) in commands.iter().enumerate() {
-                let took_s = program_s(folder.path(), &[command, path, "--threads", "1"]);
+                let took_s = measure_program_s(folder.path(), &[command, path, "--threads", "1"]);
                 times[commands.len() * i + k].push(took_s);
             }
         }
@@ -230,15 +238,15 @@ fn boundaries(rounds: usize) {
     let medians = print_table("s", &names, &times);
     println!("| ratio | |\n|---|---|");
     for (i, (criterion, _)) in criteria.iter().enumerate() {
-        let share = medians[commands.len() * i + 1] / medians[commands.len() * i];
-        println!("| {criterion}: boundary against grid | {share:.3} |");
+        let time_ratio = medians[commands.len() * i + 1] / medians[commands.len() * i];
+        println!("| {criterion}: boundary against grid | {time_ratio:.3} |");
     }
     println!();
 }
 
 /// Measures the periodic responses of both models at held speeds, with all multipliers. `pair_s` is
 /// the time of a point's two trajectories of 50 s by the fast method.
-fn dwells(rounds: usize, pair_s: f64) {
+fn measure_responses(rounds: usize, pair_s: f64) {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 50.0 };
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let mut machine = Machine::paper();
@@ -246,14 +254,14 @@ fn dwells(rounds: usize, pair_s: f64) {
     let point = prepare(Simd::widest(), &[(machine, spin)], &timing)
         .remove(0)
         .expect("the paper's machine has an equilibrium");
-    let dwells: Vec<HeldSpeed<'_>> =
+    let held_speeds: Vec<HeldSpeed<'_>> =
         (0..=140).map(|k| HeldSpeed { point: &point, speed_rpm: 210.0 + f64::from(k) }).collect();
     let mut times = vec![Vec::new()];
     for _ in 0..rounds {
-        let begin = Instant::now();
-        let found = find_responses(&dwells, Cancel::Never);
-        times[0].push(begin.elapsed().as_secs_f64() * 1e3 / dwells.len() as f64);
-        assert!(found.iter().all(Result::is_ok));
+        let start_instant = Instant::now();
+        let responses = find_responses(&held_speeds, Cancel::Never);
+        times[0].push(start_instant.elapsed().as_secs_f64() * 1e3 / held_speeds.len() as f64);
+        assert!(responses.iter().all(Result::is_ok));
     }
     println!("One core, a point of 0.4 kg and 140 N s/m at 210 to 350 rpm, by 1 rpm:\n");
     let medians =
@@ -268,7 +276,7 @@ fn dwells(rounds: usize, pair_s: f64) {
 /// Measures the search for motions at a held speed, from eight starts of 100 s, against eight
 /// trajectories with peaks: with as many steps of the same formula, and with as long a time by
 /// plain RK4.
-fn motions(rounds: usize) {
+fn measure_motions(rounds: usize) {
     const SPEED_RPM: f64 = 250.0;
     const STEPS_A_TURN: f64 = 96.0;
     let mut machine = Machine::paper();
@@ -276,19 +284,23 @@ fn motions(rounds: usize) {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![SPEED_RPM] };
     let prepare_points = |end_s: f64| -> Vec<Point> {
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-        let scenarios = vec![(machine.clone(), spin.clone()); TRAJECTORIES];
+        let scenarios = vec![(machine.clone(), spin.clone()); TRAJECTORY_COUNT];
         let points: Result<_, _> =
             prepare(Simd::widest(), &scenarios, &timing).into_iter().collect();
         points.expect("the paper's machine has an equilibrium")
     };
-    let dwell = prepare_points(1.0);
-    let dwells = [HeldSpeed { point: &dwell[0], speed_rpm: SPEED_RPM }];
-    let starts = StartRule { start_count: TRAJECTORIES, max_time_s: 100.0, ..StartRule::default() };
-    let find = || find_attractors(Simd::widest(), &dwells, &[], &starts, Cancel::Never).remove(0);
+    let dwell_points = prepare_points(1.0);
+    let held_speeds = [HeldSpeed { point: &dwell_points[0], speed_rpm: SPEED_RPM }];
+    let starts =
+        StartRule { start_count: TRAJECTORY_COUNT, max_time_s: 100.0, ..StartRule::default() };
+    let find_motions =
+        || find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never).remove(0);
     // The time is a whole number of windows.
-    let followed_s = find().map(|found| found.attractors[0].time_s).expect("it has motions");
-    let as_many = prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
-    let as_long = prepare_points(followed_s);
+    let followed_s =
+        find_motions().map(|found| found.attractors[0].time_s).expect("it has motions");
+    let points_of_as_many_steps =
+        prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
+    let points_of_as_long_time = prepare_points(followed_s);
     let integrate = |points: &[Point]| {
         let points: Vec<&Point> = points.iter().collect();
         let method = Method::rk4(STEP_S);
@@ -297,20 +309,20 @@ fn motions(rounds: usize) {
     };
     let mut times = vec![Vec::new(); 4];
     for _ in 0..rounds {
-        let works: [&dyn Fn(); 4] = [
-            &|| assert!(find().is_ok()),
-            &|| assert!(find_responses(&dwells, Cancel::Never)[0].is_ok()),
-            &|| integrate(&as_many),
-            &|| integrate(&as_long),
+        let measured_works: [&dyn Fn(); 4] = [
+            &|| assert!(find_motions().is_ok()),
+            &|| assert!(find_responses(&held_speeds, Cancel::Never)[0].is_ok()),
+            &|| integrate(&points_of_as_many_steps),
+            &|| integrate(&points_of_as_long_time),
         ];
-        for (work, times) in works.iter().zip(&mut times) {
-            let begin = Instant::now();
+        for (work, times) in measured_works.iter().zip(&mut times) {
+            let start_instant = Instant::now();
             work();
-            times.push(begin.elapsed().as_secs_f64() * 1e3);
+            times.push(start_instant.elapsed().as_secs_f64() * 1e3);
         }
     }
     println!(
-        "One core, what {SPEED_RPM} rpm ends in from {TRAJECTORIES} starts, followed for \
+        "One core, what {SPEED_RPM} rpm ends in from {TRAJECTORY_COUNT} starts, followed for \
          {followed_s:.0} s:\n"
     );
     let names = [
@@ -333,19 +345,19 @@ fn motions(rounds: usize) {
 
 /// Measures the map of Fig. 12 by the program. `once_s` is the time of one trajectory of each model
 /// at every point, by the coarsest level.
-fn threads(rounds: usize, once_s: f64) {
+fn measure_threads(rounds: usize, once_s: f64) {
     let folder = temporary_folder();
-    let counts = ["1", "2"];
-    let mut times = vec![Vec::new(); counts.len()];
+    let thread_counts = ["1", "2"];
+    let mut times = vec![Vec::new(); thread_counts.len()];
     for _ in 0..rounds {
-        for (count, times) in counts.iter().zip(&mut times) {
-            times.push(program_s(folder.path(), &["run", FIG12, "--threads", count]));
+        for (count, times) in thread_counts.iter().zip(&mut times) {
+            times.push(measure_program_s(folder.path(), &["run", FIG12_PATH, "--threads", count]));
         }
     }
     println!(
         "`sweep run sweeps/fig12.toml` (1287 points, both models), start of the program included:\n"
     );
-    let names: Vec<_> = counts.iter().map(|count| format!("--threads {count}")).collect();
+    let names: Vec<_> = thread_counts.iter().map(|count| format!("--threads {count}")).collect();
     let medians = print_table("s a map", &names, &times);
     println!(
         "| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n| the run against its \
@@ -358,15 +370,15 @@ fn threads(rounds: usize, once_s: f64) {
 /// Measures the time that each element of a suspension adds to a step. The machines have two
 /// friction dampers, three stops, a gasket or four stiffening springs, with the numbers of
 /// `docs/examples/friction.toml`; the numbers of the springs are assumed.
-fn elements(rounds: usize) {
-    let friction = |machine: &mut Machine| {
+fn measure_elements(rounds: usize) {
+    let add_friction = |machine: &mut Machine| {
         for damper in &mut machine.dampers {
             damper.friction_n = 50.0;
             damper.friction_speed_m_per_s = 0.01;
             damper.friction_linear_speed_m_per_s = Some(0.15);
         }
     };
-    let stops = |machine: &mut Machine| {
+    let add_stops = |machine: &mut Machine| {
         let places = [
             ([0.35, 0.0, 0.28], [0.0, 0.0, 1.0], 0.02),
             ([0.35, 0.0, -0.28], [0.0, 0.0, -1.0], 0.02),
@@ -383,7 +395,7 @@ fn elements(rounds: usize) {
             })
             .to_vec();
     };
-    let gasket = |machine: &mut Machine| {
+    let add_gasket = |machine: &mut Machine| {
         machine.bushings = vec![Bushing {
             tub_m: [0.45, 0.0, 0.0],
             stiffness_n_per_m: [0.0, 600.0, 600.0],
@@ -391,25 +403,25 @@ fn elements(rounds: usize) {
             damping_n_s_per_m: [0.0, 12.0, 12.0],
         }];
     };
-    let stiffening = |machine: &mut Machine| {
+    let stiffen_springs = |machine: &mut Machine| {
         machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = 2e5);
     };
-    type Fit<'a> = &'a dyn Fn(&mut Machine);
-    let subjects: [(&str, &[Fit<'_>]); 6] = [
+    type MachineChange<'a> = &'a dyn Fn(&mut Machine);
+    let subjects: [(&str, &[MachineChange<'_>]); 6] = [
         ("none", &[]),
-        ("two friction dampers", &[&friction]),
-        ("three stops", &[&stops]),
-        ("gasket", &[&gasket]),
-        ("four stiffening springs", &[&stiffening]),
-        ("all of these", &[&friction, &stops, &gasket, &stiffening]),
+        ("two friction dampers", &[&add_friction]),
+        ("three stops", &[&add_stops]),
+        ("gasket", &[&add_gasket]),
+        ("four stiffening springs", &[&stiffen_springs]),
+        ("all of these", &[&add_friction, &add_stops, &add_gasket, &stiffen_springs]),
     ];
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
-    let machines = subjects.map(|(_, fits)| {
-        let scenarios: Vec<_> = (0..TRAJECTORIES)
+    let points_by_subject = subjects.map(|(_, fits)| {
+        let scenarios: Vec<_> = (0..TRAJECTORY_COUNT)
             .map(|i| {
                 let mut machine = Machine::paper();
-                machine.unbalance.mass_kg = 0.1 + 0.3 * i as f64 / TRAJECTORIES as f64;
+                machine.unbalance.mass_kg = 0.1 + 0.3 * i as f64 / TRAJECTORY_COUNT as f64;
                 fits.iter().for_each(|fit| fit(&mut machine));
                 (machine, spin.clone())
             })
@@ -418,17 +430,17 @@ fn elements(rounds: usize) {
     });
     let mut times = vec![Vec::new(); subjects.len()];
     for _ in 0..rounds {
-        for (points, times) in machines.iter().zip(&mut times) {
+        for (points, times) in points_by_subject.iter().zip(&mut times) {
             let points: Vec<&Point> = points
                 .iter()
                 .map(|point| point.as_ref().expect("every machine here has an equilibrium"))
                 .collect();
-            let begin = Instant::now();
+            let start_instant = Instant::now();
             for model in [ModelKind::Nonlinear, ModelKind::Linear] {
                 let records = simulate(Simd::widest(), model, &Method::rk4(2e-4), &points);
                 assert!(records.iter().all(|record| record.failure.is_none()));
             }
-            times.push(begin.elapsed().as_secs_f64() * 1e3 / TRAJECTORIES as f64);
+            times.push(start_instant.elapsed().as_secs_f64() * 1e3 / TRAJECTORY_COUNT as f64);
         }
     }
     println!("One core, both models by RK4 at 2e-4 s, machines with elements:\n");

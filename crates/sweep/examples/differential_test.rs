@@ -44,12 +44,12 @@ pub(crate) const GRID_ROWS: u64 = 9;
 const MAX_REFUSED_GRIDS: u64 = 40;
 
 /// Step of RK4 (s) that resolves the vibration of the bearings after jumps of the speed. Basis: an
-/// eighth of [`STEP_S`]. Doubling it makes the reference's error 16 times as large.
+/// eighth of [`REFERENCE_STEP_S`]. Doubling it makes the reference's error 16 times as large.
 const JUMP_STEP_S: f64 = 1.25e-5;
 
 /// Step of RK4 (s) in all other grids. Basis: stable with bearings as stiff as the paper's, the
 /// stiffest of these grids. Doubling it makes the reference's error 16 times as large.
-const STEP_S: f64 = 1e-4;
+const REFERENCE_STEP_S: f64 = 1e-4;
 
 const CHANNELS: [&str; 8] = [
     "tub_front_y",
@@ -81,7 +81,7 @@ const VARIED_PARAMETERS: [(&str, f64, f64); 14] = [
 ];
 
 /// A machine with every kind of element except a second unbalance.
-const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
+const MACHINE_WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
 
 /// The parameters of elements that vary, each with its central value m and an exponent e: values
 /// are between m / 10^e and m * 10^e.
@@ -124,9 +124,9 @@ const TRIAL_KINDS: [(&str, TrialKind); 4] = [
 ];
 
 /// A random number generator with a seed (splitmix64).
-struct Rng(u64);
+struct RandomGenerator(u64);
 
-impl Rng {
+impl RandomGenerator {
     fn next_f64(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -150,8 +150,8 @@ impl Rng {
 }
 
 /// Returns a grid file of nine points.
-fn grid(seed: u64) -> String {
-    let mut rng = Rng(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
+fn random_grid(seed: u64) -> String {
+    let mut rng = RandomGenerator(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
     let end_s = rng.between(4.0, 26.0);
     let peak_rpm = *rng.choose(&[120.0, 300.0, 350.0, 350.0, 500.0, 900.0]) * rng.factor(1.3);
     let spin = match (rng.next_f64() * 4.0) as u32 {
@@ -168,18 +168,18 @@ fn grid(seed: u64) -> String {
             )
         }
     };
-    let peak =
+    let peak_line =
         if spin.contains("table") { String::new() } else { format!("\npeak_rpm = {peak_rpm}") };
     let from_s = end_s * rng.between(0.0, 0.8);
     let to_s = rng.between(from_s + 0.1 * (end_s - from_s), end_s);
-    let mut set = String::new();
+    let mut set_lines = String::new();
     for (name, value, max_factor) in VARIED_PARAMETERS {
         if rng.next_f64() < 0.4 && max_factor > 1.0 {
-            set += &format!("{name} = {}\n", value * rng.factor(max_factor));
+            set_lines += &format!("{name} = {}\n", value * rng.factor(max_factor));
         }
     }
     if rng.next_f64() < 0.15 {
-        set +=
+        set_lines +=
             &format!("bearing_stiffness_n_per_m = {}\n", 2e8 * 10f64.powf(rng.between(-2.5, 0.0)));
     }
     let mut channels: Vec<_> = CHANNELS.into_iter().filter(|_| rng.next_f64() < 0.35).collect();
@@ -187,16 +187,16 @@ fn grid(seed: u64) -> String {
         channels.push(*rng.choose(&CHANNELS));
     }
     let criterion = *rng.choose(&["peak", "peak", "peak", "envelope", "rms"]);
-    let limit = *rng.choose(&[1.2, 1.5, 2.0, 2.0, 3.0, 5.0]);
+    let ratio_limit = *rng.choose(&[1.2, 1.5, 2.0, 2.0, 3.0, 5.0]);
     let masses = [0.05, 0.4, 1.0].map(|mass| mass * rng.factor(1.6));
     let dampings = [60.0, 120.0, 240.0].map(|damping| damping * rng.factor(1.5));
     format!(
         "name = \"trial-{seed}\"\nmetrics = [\"cabinet_force\"]\n\
-         [set]\n{set}[spin]\n{spin}{peak}\n\
+         [set]\n{set_lines}[spin]\n{spin}{peak_line}\n\
          [time]\nend_s = {end_s}\nwindow_s = [{from_s}, {to_s}]\n\
          [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n\
          [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = {dampings:?}\n\
-         [reliability]\ncriterion = \"{criterion}\"\nratio_limit = {limit}\n\
+         [reliability]\ncriterion = \"{criterion}\"\nratio_limit = {ratio_limit}\n\
          channels = {channels:?}\n"
     )
 }
@@ -280,7 +280,7 @@ fn column_difference(column: &str, min_scale: f64, a: &MapRow, b: &MapRow) -> Op
 }
 
 /// Returns the greatest relative difference of the numbers of two rows.
-fn difference(plan: &Plan, a: &MapRow, b: &MapRow) -> f64 {
+fn relative_row_difference(plan: &Plan, a: &MapRow, b: &MapRow) -> f64 {
     greatest_difference(plan, a, b).1
 }
 
@@ -341,8 +341,8 @@ fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<MapRow> {
 
 /// Returns the clearance at which drum and tub just touch in one of the rows, as an argument of
 /// `--set`; `None` if that row failed.
-fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
-    let mut rng = Rng(!seed);
+fn find_grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
+    let mut rng = RandomGenerator(!seed);
     let rows = evaluate_with(plan, rk4_mass_scaled(1e-3));
     let gap_m = rng.choose(&rows).number("min_gap_nonlinear_m")?;
     let closest_approach_m = plan.model.machine.radial_clearance_m - gap_m;
@@ -351,26 +351,27 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
 }
 
 /// Writes the file of a machine with elements, and returns the grid with that machine.
-fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
-    let mut rng = Rng(seed.rotate_left(32));
+fn write_machine_with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
+    let mut rng = RandomGenerator(seed.rotate_left(32));
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
     // Each grid has a separate machine file, because grids are read while others are written.
     let machine = format!("machine-{seed}.toml");
-    std::fs::write(folder.join(&machine), format!("{WITH_ELEMENTS}\n{unbalance}"))
+    std::fs::write(folder.join(&machine), format!("{MACHINE_WITH_ELEMENTS}\n{unbalance}"))
         .expect("the temporary folder can be written to");
-    let mut set = String::new();
+    let mut set_lines = String::new();
     for (name, value, exponent) in VARIED_ELEMENTS {
-        let is_set_already = name.starts_with("damper_2") && set.contains("friction_n");
+        let is_set_already = name.starts_with("damper_2") && set_lines.contains("friction_n");
         if rng.next_f64() < 0.5 && !is_set_already {
-            set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-exponent, exponent)));
+            set_lines +=
+                &format!("{name} = {}\n", value * 10f64.powf(rng.between(-exponent, exponent)));
         }
     }
-    grid.replacen("[set]\n", &format!("machine = \"{machine}\"\n[set]\n{set}"), 1)
+    grid.replacen("[set]\n", &format!("machine = \"{machine}\"\n[set]\n{set_lines}"), 1)
 }
 
 /// Returns the grid with a drum that runs up, brakes within milliseconds, and continues.
-fn with_jumps(seed: u64, grid: &str) -> String {
-    let mut rng = Rng(seed.rotate_left(16));
+fn grid_with_jumps(seed: u64, grid: &str) -> String {
+    let mut rng = RandomGenerator(seed.rotate_left(16));
     let end_s = rng.between(3.0, 6.0);
     let brake_start_s = end_s * rng.between(0.2, 0.6);
     let brake_s = 10f64.powf(rng.between(-3.5, -1.0));
@@ -389,8 +390,8 @@ fn with_jumps(seed: u64, grid: &str) -> String {
 }
 
 /// Returns the grid with very small unbalances, and with a ratio limit that such motions may pass.
-fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
-    let mut rng = Rng(seed.rotate_left(48));
+fn grid_with_tiny_unbalances(seed: u64, grid: &str) -> String {
+    let mut rng = RandomGenerator(seed.rotate_left(48));
     let masses = [0.0, rng.between(0.0, 1e-4), 10f64.powf(rng.between(-6.0, -3.0))];
     let (before, rest) = grid.split_once("values = [").expect("masses");
     let (_, after) = rest.split_once(']').expect("their end");
@@ -404,35 +405,35 @@ fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
 /// Compares the rows of a grid with those of RK4.
 fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTotals {
     let path = folder.join(format!("{seed}.toml"));
-    let mut text = grid(seed);
+    let mut grid_text = random_grid(seed);
     let is_grazing = kind == TrialKind::Grazing;
     if is_grazing {
-        text = text.replace("cabinet_force", "clash_time");
+        grid_text = grid_text.replace("cabinet_force", "clash_time");
     }
     if kind == TrialKind::Elements {
         let loads = "\"cabinet_force\", \"stop_force\", \"stop_contact\", \"foot_load\", \
                      \"slip_margin\", \"damper_speed\"";
-        text = text.replace("\"cabinet_force\"", loads);
-        text = with_elements(seed, &text, folder);
+        grid_text = grid_text.replace("\"cabinet_force\"", loads);
+        grid_text = write_machine_with_elements(seed, &grid_text, folder);
     }
     if kind == TrialKind::Jumps {
-        text = with_jumps(seed, &text);
+        grid_text = grid_with_jumps(seed, &grid_text);
     }
     if kind == TrialKind::Tiny {
-        text = with_tiny_unbalances(seed, &text);
+        grid_text = grid_with_tiny_unbalances(seed, &grid_text);
     }
     let accuracy = ACCURACIES[(seed % 4) as usize];
-    let step_s = if kind == TrialKind::Jumps { JUMP_STEP_S } else { STEP_S };
-    std::fs::write(&path, &text).expect("the temporary folder can be written to");
-    let mut loaded = sweep::load(&path, &[]).ok();
+    let step_s = if kind == TrialKind::Jumps { JUMP_STEP_S } else { REFERENCE_STEP_S };
+    std::fs::write(&path, &grid_text).expect("the temporary folder can be written to");
+    let mut loaded_plan = sweep::load(&path, &[]).ok();
     if is_grazing {
-        let clearance = loaded.and_then(|plan| grazing_clearance(seed, &plan));
-        loaded = clearance.and_then(|set| sweep::load(&path, &[set]).ok());
+        let clearance = loaded_plan.and_then(|plan| find_grazing_clearance(seed, &plan));
+        loaded_plan = clearance.and_then(|set| sweep::load(&path, &[set]).ok());
     }
     if std::env::var("DUMP").is_ok() {
-        eprintln!("{text}");
+        eprintln!("{grid_text}");
     }
-    let Some(plan) = loaded else {
+    let Some(plan) = loaded_plan else {
         return TrialTotals { refused: 1, ..TrialTotals::default() };
     };
     let evaluate = |integrator| evaluate_with(&plan, integrator);
@@ -445,33 +446,33 @@ fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTota
         let method = MethodKind::named(row.name("method").unwrap_or_default()).unwrap_or_default();
         totals.by_method[method as usize] += 1;
         totals.failed += u64::from(row.status() != "ok");
-        let mut coarser =
+        let mut find_coarser_row =
             || coarser_rows.get_or_insert_with(|| evaluate(rk4(2.0 * step_s)))[i].clone();
         if row.flag("sensitive") == Some(true) {
             totals.sensitive += 1;
-            let coarser = coarser();
-            let agrees = coarser.status() == reference.status()
-                && difference(&plan, &coarser, reference) <= accuracy;
-            totals.needlessly_sensitive += u64::from(agrees);
+            let coarser_row = find_coarser_row();
+            let coarser_agrees = coarser_row.status() == reference.status()
+                && relative_row_difference(&plan, &coarser_row, reference) <= accuracy;
+            totals.needlessly_sensitive += u64::from(coarser_agrees);
             continue;
         }
         let mut reference = reference;
         let estimate = row.number("error").unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
-        let differs = difference(&plan, row, reference) > accuracy.min(estimate)
+        let differs = relative_row_difference(&plan, row, reference) > accuracy.min(estimate)
             || row.flag("reliable") != reference.flag("reliable");
         if differs {
             // The reference may be wrong, because the fast method refines rows to shorter steps.
-            let finer = rk4(step_s / 8.0);
-            reference = &finer_rows.get_or_insert_with(|| evaluate(finer))[i];
+            let finer_method = rk4(step_s / 8.0);
+            reference = &finer_rows.get_or_insert_with(|| evaluate(finer_method))[i];
         }
-        let error = difference(&plan, row, reference);
+        let error = relative_row_difference(&plan, row, reference);
         if row.flag("converged") == Some(false) {
             totals.unconverged += 1;
             let is_right = row.status() == reference.status() && error <= accuracy;
             totals.needlessly_unconverged += u64::from(is_right);
             continue;
         }
-        let mut report = |counter: fn(&mut TrialTotals) -> &mut u64, quantity: &str| {
+        let mut report_exception = |counter: fn(&mut TrialTotals) -> &mut u64, quantity: &str| {
             *counter(&mut totals) += 1;
             let method = method.name();
             let estimate = row.number("error").unwrap_or(f64::NAN);
@@ -482,11 +483,11 @@ fn check_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> TrialTota
             ));
         };
         if row.status() != reference.status() {
-            report(|totals| &mut totals.wrong_status, "status");
+            report_exception(|totals| &mut totals.wrong_status, "status");
         } else if error > accuracy {
-            report(|totals| &mut totals.inaccurate, "number");
+            report_exception(|totals| &mut totals.inaccurate, "number");
         } else if row.flag("reliable") != reference.flag("reliable") {
-            report(|totals| &mut totals.wrong_verdict, "verdict");
+            report_exception(|totals| &mut totals.wrong_verdict, "verdict");
         } else {
             totals.greatest_error = totals.greatest_error.max(error / accuracy);
             let ratio = &mut totals.error_over_estimate[method as usize];
@@ -511,13 +512,13 @@ pub(crate) fn check_grids(rows: u64, first_seed: u64, kind: TrialKind) -> TrialT
     let name = format!("sweep-differential-test-{}-{}", std::process::id(), kind as u8);
     let folder = std::env::temp_dir().join(name);
     std::fs::create_dir_all(&folder).expect("a temporary folder");
-    let grids = rows.div_ceil(GRID_ROWS);
+    let grid_count = rows.div_ceil(GRID_ROWS);
     let first_seed = if first_seed < 1_000_000 { first_seed * 1_000_000 } else { first_seed };
-    let totals = (first_seed..first_seed + grids)
+    let totals = (first_seed..first_seed + grid_count)
         .into_par_iter()
         .map(|seed| {
             // A refused grid is replaced by another one.
-            let seeds = (0..MAX_REFUSED_GRIDS).map(|k| seed + k * grids);
+            let seeds = (0..MAX_REFUSED_GRIDS).map(|k| seed + k * grid_count);
             let mut totals = TrialTotals::default();
             for seed in seeds {
                 totals = totals.merge(check_grid(seed, kind, &folder));
@@ -535,12 +536,12 @@ pub(crate) fn check_grids(rows: u64, first_seed: u64, kind: TrialKind) -> TrialT
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
-    let rows = arguments.next().and_then(|argument| argument.parse::<u64>().ok());
+    let row_count = arguments.next().and_then(|argument| argument.parse::<u64>().ok());
     let seed = match arguments.next().as_deref() {
         None | Some("clock") => Some(seed_from_clock()),
         Some(argument) => argument.parse().ok(),
     };
-    let (Some(rows), Some(first_seed)) = (rows, seed) else {
+    let (Some(row_count), Some(first_seed)) = (row_count, seed) else {
         let kinds = TRIAL_KINDS.map(|(name, _)| name).join("|");
         eprintln!("usage: differential_test ROWS [SEED|clock [{kinds}]]");
         return ExitCode::from(2);
@@ -559,8 +560,8 @@ fn main() -> ExitCode {
     // therefore is large.
     let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
     pool.expect("nothing has used the pool");
-    let totals = check_grids(rows, first_seed, kind);
-    let grids = rows.div_ceil(GRID_ROWS);
+    let totals = check_grids(row_count, first_seed, kind);
+    let grids = row_count.div_ceil(GRID_ROWS);
     eprintln!(
         "{} rows of {grids} grids ({} refused), seed {first_seed}",
         totals.rows, totals.refused

@@ -51,9 +51,9 @@ const SPECIAL_WORDS: [&[u8]; 12] = [
 ];
 
 /// A random number generator with a seed (splitmix64).
-struct Rng(u64);
+struct RandomGenerator(u64);
 
-impl Rng {
+impl RandomGenerator {
     fn next_u64(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -74,7 +74,7 @@ impl Rng {
     }
 }
 
-fn mutate(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
+fn mutate_input(rng: &mut RandomGenerator, seeds: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = seeds[rng.random_below(seeds.len())].clone();
     for _ in 0..=rng.next_u64() % MAX_CHANGES {
         let position = rng.random_below(bytes.len() + 1);
@@ -106,7 +106,7 @@ fn mutate(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-fn seeds(corpus: &Path) -> Vec<Vec<u8>> {
+fn read_corpus(corpus: &Path) -> Vec<Vec<u8>> {
     let entries = fs::read_dir(corpus).expect("there is a corpus");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
@@ -129,46 +129,47 @@ fn peak_kb() -> String {
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let number = |k: usize, default: u64| {
+    let number_argument = |k: usize, default: u64| {
         arguments.get(k).map_or(default, |text| text.parse().expect("a whole number"))
     };
     let name = arguments.first().map_or("list", String::as_str);
-    let run = match name {
+    let run_target = match name {
         "list" => list::run,
         "result" => result::run,
         "folder" => folder::run,
         _ => panic!("no target {name}: expected list, result or folder"),
     };
-    let seconds = number(1, 60);
-    let mut rng = Rng(number(2, 1));
+    let seconds = number_argument(1, 60);
+    let mut rng = RandomGenerator(number_argument(2, 1));
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let findings = root.join("target/fuzz/findings");
     fs::create_dir_all(&findings).expect("a folder for findings");
-    let seeds = seeds(&root.join("fuzz").join(format!("corpus-{name}")));
+    let seeds = read_corpus(&root.join("fuzz").join(format!("corpus-{name}")));
 
     let start_time = Instant::now();
-    let mut count = 0_u64;
+    let mut input_count = 0_u64;
     let mut findings_count = 0_u64;
     let mut slowest = Duration::ZERO;
-    let unchanged = seeds.clone().into_iter();
-    let mut inputs = unchanged.chain(std::iter::repeat_with(|| mutate(&mut rng, &seeds)));
+    let unchanged_inputs = seeds.clone().into_iter();
+    let mut inputs =
+        unchanged_inputs.chain(std::iter::repeat_with(|| mutate_input(&mut rng, &seeds)));
     while start_time.elapsed() < Duration::from_secs(seconds) {
         let Some(input) = inputs.next() else { break };
-        let start = thread_time();
-        let is_sound = catch_unwind(|| run(&input)).is_ok();
-        let duration = thread_time() - start;
-        count += 1;
+        let start_time_of_input = thread_time();
+        let is_sound = catch_unwind(|| run_target(&input)).is_ok();
+        let duration = thread_time() - start_time_of_input;
+        input_count += 1;
         slowest = slowest.max(duration);
         if !is_sound || duration > MAX_TIME {
             findings_count += 1;
-            let path = findings.join(format!("{name}-{count}"));
+            let path = findings.join(format!("{name}-{input_count}"));
             fs::write(&path, &input).expect("a finding is kept");
             let kind = if is_sound { "slow" } else { "panic" };
             eprintln!("{}: {kind} after {duration:?}", path.display());
         }
     }
     eprintln!(
-        "{name}: {count} inputs from {} in {:.0} s, slowest {slowest:?}, \
+        "{name}: {input_count} inputs from {} in {:.0} s, slowest {slowest:?}, \
          at most {}, {findings_count} findings",
         seeds.len(),
         start_time.elapsed().as_secs_f64(),

@@ -110,23 +110,24 @@ fn format_out_help(verb: &str) -> String {
 
 /// Returns the examples of a subcommand, or those of the program for the name `sweep`.
 fn find_examples(name: &str) -> Examples {
-    let parts = EXAMPLES.split("\n\n");
-    let lines_text = parts.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
-    let lines: Vec<&str> = lines_text.unwrap_or_default().lines().map(str::trim).collect();
+    let sections = EXAMPLES.split("\n\n");
+    let example_lines =
+        sections.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
+    let lines: Vec<&str> = example_lines.unwrap_or_default().lines().map(str::trim).collect();
     lines.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
 /// Returns the command line with the examples and the headings of its help.
-pub(crate) fn command() -> clap::Command {
+pub(crate) fn command_line() -> clap::Command {
     let add_examples =
         |command: clap::Command, lines: Examples| match examples::format_examples(&lines) {
             Some(examples) => command.before_help(examples),
             None => command,
         };
     let program = add_examples(WasherCli::command(), find_examples("sweep"));
-    let names: Vec<String> =
+    let subcommand_names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
-    let program = names.into_iter().fold(program, |program, name| {
+    let program = subcommand_names.into_iter().fold(program, |program, name| {
         program.mut_subcommand(&name, |command| add_examples(command, find_examples(&name)))
     });
     let template = format_help_template(&program);
@@ -136,58 +137,63 @@ pub(crate) fn command() -> clap::Command {
 /// Sorts the subcommands by the order of [`COMMAND_GROUPS`], which manual pages and documents
 /// follow.
 fn sort_by_group(mut program: clap::Command) -> clap::Command {
-    let mut sorted: Vec<clap::Command> = program.get_subcommands().cloned().collect();
-    sorted.sort_by_key(|command| {
+    let mut sorted_subcommands: Vec<clap::Command> = program.get_subcommands().cloned().collect();
+    sorted_subcommands.sort_by_key(|command| {
         COMMAND_GROUPS
             .iter()
             .flat_map(|(_, names)| *names)
             .position(|name| *name == command.get_name())
     });
-    program.get_subcommands_mut().zip(sorted).for_each(|(slot, command)| *slot = command);
+    program
+        .get_subcommands_mut()
+        .zip(sorted_subcommands)
+        .for_each(|(subcommand_slot, command)| *subcommand_slot = command);
     program
 }
 
 /// Returns the template of the program's help. clap has headings for arguments only, so the
 /// template has the subcommands.
 fn format_help_template(program: &clap::Command) -> String {
-    let header = program.get_styles().get_header();
+    let header_style = program.get_styles().get_header();
     let name_style = program.get_styles().get_literal();
-    let mut text = String::from("{before-help}{about-with-newline}\n{usage-heading} {usage}\n\n");
+    let mut template =
+        String::from("{before-help}{about-with-newline}\n{usage-heading} {usage}\n\n");
     for (heading, names) in COMMAND_GROUPS {
-        text += &format!("{header}{heading}:{header:#}\n");
+        template += &format!("{header_style}{heading}:{header_style:#}\n");
         for name in names {
             let command = program.find_subcommand(name);
             let about = command.and_then(clap::Command::get_about).cloned().unwrap_or_default();
-            text += &format!("  {name_style}{name:11}{name_style:#}  {about}\n");
+            template += &format!("  {name_style}{name:11}{name_style:#}  {about}\n");
         }
-        text.push('\n');
+        template.push('\n');
     }
-    text + &format!("{header}Options:{header:#}\n{{options}}{{after-help}}")
+    template + &format!("{header_style}Options:{header_style:#}\n{{options}}{{after-help}}")
 }
 
 /// Returns the command line without hidden subcommands, for lists of all subcommands.
 pub(crate) fn visible_command() -> clap::Command {
-    let whole = command();
-    let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
+    let whole_command = command_line();
+    let visible_subcommands =
+        whole_command.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
     clap::Command::new("sweep")
         .version(env!("CARGO_PKG_VERSION"))
-        .about(whole.get_about().cloned().unwrap_or_default())
+        .about(whole_command.get_about().cloned().unwrap_or_default())
         .disable_help_subcommand(true)
-        .args(whole.get_arguments().cloned())
-        .subcommands(shown)
+        .args(whole_command.get_arguments().cloned())
+        .subcommands(visible_subcommands)
 }
 
 /// Adds a suggestion to the error of an unknown subcommand, if clap has none: two swapped letters
 /// make a short name too different for clap's similarity measure.
 fn add_suggestion(mut error: clap::Error) -> clap::Error {
-    let typed = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
+    let typed_name = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
         (ErrorKind::InvalidSubcommand, Some(ContextValue::String(typed))) => typed.clone(),
         _ => return error,
     };
-    let shown = visible_command();
-    let names = shown.get_subcommands().map(clap::Command::get_name);
+    let visible_program = visible_command();
+    let names = visible_program.get_subcommands().map(clap::Command::get_name);
     if let (None, Some(name)) =
-        (error.get(ContextKind::SuggestedSubcommand), nearest_name(&typed, names))
+        (error.get(ContextKind::SuggestedSubcommand), nearest_name(&typed_name, names))
     {
         error
             .insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name.to_owned()]));
@@ -200,7 +206,7 @@ impl WasherCli {
     /// and ends the process.
     pub fn read() -> Self {
         let matches =
-            command().try_get_matches().unwrap_or_else(|error| add_suggestion(error).exit());
+            command_line().try_get_matches().unwrap_or_else(|error| add_suggestion(error).exit());
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
 }
@@ -222,7 +228,7 @@ impl Command {
             Self::Fit(args) => fit::run(args),
             Self::Init(args) => init::run(args),
             Self::Completions(args) => completions::run(args, visible_command()),
-            Self::Man(args) => man::run(args, command(), &find_examples),
+            Self::Man(args) => man::run(args, command_line(), &find_examples),
         }
     }
 }
@@ -256,13 +262,13 @@ mod tests {
 
     #[test]
     fn the_command_line_is_well_formed() {
-        command().debug_assert();
+        command_line().debug_assert();
     }
 
     #[test]
     fn an_error_for_a_misspelt_short_subcommand_suggests_its_name() {
         let error_message = |typed: &str| {
-            add_suggestion(command().try_get_matches_from(["sweep", typed]).unwrap_err())
+            add_suggestion(command_line().try_get_matches_from(["sweep", typed]).unwrap_err())
                 .to_string()
         };
         assert!(error_message("rnu").contains("'run'"), "{}", error_message("rnu"));
@@ -272,19 +278,19 @@ mod tests {
 
     #[test]
     fn every_output_option_has_a_long_and_a_short_flag() {
-        let mut count = 0;
-        for subcommand in command().get_subcommands() {
+        let mut checked_count = 0;
+        for subcommand in command_line().get_subcommands() {
             for flag in subcommand.get_arguments() {
                 let long: Vec<&str> = flag.get_long_and_visible_aliases().unwrap_or_default();
                 if long.contains(&"out") || flag.get_short() == Some('o') {
                     let name = subcommand.get_name();
                     assert!(long.contains(&"out"), "{name} --out");
                     assert_eq!(flag.get_short(), Some('o'), "{name} -o");
-                    count += 1;
+                    checked_count += 1;
                 }
             }
         }
-        assert!(count > 5, "{count}");
+        assert!(checked_count > 5, "{checked_count}");
     }
 
     /// Returns the words of a line by a shell's rules: single quotes keep spaces.
@@ -301,44 +307,57 @@ mod tests {
 
     #[test]
     fn every_visible_command_has_examples_and_every_example_parses() {
-        let whole = command();
-        let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
-        for name in shown.map(clap::Command::get_name).chain(["sweep"]) {
+        let whole_command = command_line();
+        let visible_subcommands =
+            whole_command.get_subcommands().filter(|command| !command.is_hide_set());
+        for name in visible_subcommands.map(clap::Command::get_name).chain(["sweep"]) {
             // The first example calls the command itself; further ones may use its output.
             let lines = find_examples(name);
-            let call = format!("sweep {name}").replace("sweep sweep", "sweep ");
-            assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&call)), "{name}");
+            let call_start = format!("sweep {name}").replace("sweep sweep", "sweep ");
+            assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&call_start)), "{name}");
             for [line, _] in lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
-                let parsed = command().try_get_matches_from(split_words(line));
-                assert!(parsed.is_ok(), "{line}: {parsed:?}");
+                let parse_result = command_line().try_get_matches_from(split_words(line));
+                assert!(parse_result.is_ok(), "{line}: {parse_result:?}");
             }
         }
     }
 
     #[test]
     fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
-        for name in command().get_subcommands().map(clap::Command::get_name).chain(["sweep"]) {
+        for name in command_line().get_subcommands().map(clap::Command::get_name).chain(["sweep"]) {
             let lines = find_examples(name);
-            let shown = examples::format_examples(&lines).unwrap_or_default();
-            assert!(shown.lines().all(|line| line.len() <= examples::MAX_LINE_WIDTH), "{shown}");
+            let formatted_examples = examples::format_examples(&lines).unwrap_or_default();
+            assert!(
+                formatted_examples.lines().all(|line| line.len() <= examples::MAX_LINE_WIDTH),
+                "{formatted_examples}"
+            );
             // A shell joins folded lines.
-            let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
-            assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
+            let unfolded_text = formatted_examples
+                .replace("\\\n", "")
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ");
+            assert!(
+                lines.iter().all(|[line, _]| unfolded_text.contains(line)),
+                "{formatted_examples}"
+            );
         }
     }
 
     #[test]
     fn help_lists_every_visible_command_once_under_a_heading() {
-        let whole = command();
-        let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
-        let shown: Vec<&str> = shown.map(clap::Command::get_name).collect();
-        let grouped: Vec<&str> =
+        let whole_command = command_line();
+        let visible_subcommands =
+            whole_command.get_subcommands().filter(|command| !command.is_hide_set());
+        let visible_names: Vec<&str> = visible_subcommands.map(clap::Command::get_name).collect();
+        let grouped_names: Vec<&str> =
             COMMAND_GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
-        assert_eq!(shown, grouped);
-        let help = command().render_help().to_string();
-        let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next());
-        for line in list.expect("the list of commands").lines() {
+        assert_eq!(visible_names, grouped_names);
+        let help = command_line().render_help().to_string();
+        let command_list =
+            help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next());
+        for line in command_list.expect("the list of commands").lines() {
             assert!(line.len() <= examples::MAX_LINE_WIDTH, "{line}");
         }
         assert!(help.contains("\nSet up:\n  init "), "{help}");
@@ -346,18 +365,18 @@ mod tests {
 
     #[test]
     fn help_of_a_command_begins_with_its_examples() {
-        let mut command = command();
-        let run = command.find_subcommand_mut("run").unwrap();
-        let help = run.render_help().to_string();
-        let position =
+        let mut command = command_line();
+        let run_command = command.find_subcommand_mut("run").unwrap();
+        let help = run_command.render_help().to_string();
+        let position_of =
             |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
-        assert!(position("--shard 3/16") < position("Usage:"));
+        assert!(position_of("--shard 3/16") < position_of("Usage:"));
     }
 
     #[test]
     fn help_names_the_file_that_a_command_writes() {
         for (name, file) in [("run", "NAME"), ("stability", "NAME-stability")] {
-            let mut command = command();
+            let mut command = command_line();
             let help = command.find_subcommand_mut(name).unwrap().render_help().to_string();
             assert!(help.contains(&format!("[default: results/{file}.parquet]")), "{help}");
         }
@@ -365,7 +384,7 @@ mod tests {
 
     #[test]
     fn help_shows_the_examples_before_the_usage_and_the_exit_codes_after() {
-        let help = command().render_help().to_string();
+        let help = command_line().render_help().to_string();
         let position =
             |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text} in\n{help}"));
         assert!(

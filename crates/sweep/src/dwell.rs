@@ -50,12 +50,12 @@ impl FromStr for Carry {
 /// The expected value of a kick or of the longest time, in messages.
 const EXPECTED_POSITIVE: &str = "a number above 0, at most 1e5";
 
-fn is_positive(value: f64) -> bool {
+fn is_accepted_positive(value: f64) -> bool {
     value > 0.0 && value <= 1e5
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| is_positive(*value));
+    let value = text.parse().ok().filter(|value| is_accepted_positive(*value));
     value.ok_or_else(|| format!("expected {EXPECTED_POSITIVE}"))
 }
 
@@ -123,7 +123,7 @@ impl AttractorSearch {
             return Err(Error::option("starts", self.starts, "a number from 1 to 1024"));
         }
         for (option, value) in [("kick", self.kick), ("longest", self.longest)] {
-            if !is_positive(value) {
+            if !is_accepted_positive(value) {
                 return Err(Error::option(option, value, EXPECTED_POSITIVE));
             }
         }
@@ -131,34 +131,34 @@ impl AttractorSearch {
     }
 
     /// Returns the search and its speeds as JSON, for the plan of a result.
-    pub(crate) fn json(&self, speeds_rpm: &[f64]) -> Value {
-        let mut json = json!({
+    pub(crate) fn to_json(&self, speeds_rpm: &[f64]) -> Value {
+        let mut search_json = json!({
             "speed_rpm": speeds_rpm,
             "longest_s": self.longest,
             "threshold": self.threshold,
         });
         if self.sections > 0 {
-            json["sections"] = json!(self.sections);
+            search_json["sections"] = json!(self.sections);
         }
         match self.carry {
-            Some(carry) => json["carry"] = json!(carry.name()),
+            Some(carry) => search_json["carry"] = json!(carry.name()),
             None => {
-                json["starts"] = json!(self.starts);
-                json["kick_rad_per_s"] = json!(self.kick);
+                search_json["starts"] = json!(self.starts);
+                search_json["kick_rad_per_s"] = json!(self.kick);
             }
         }
-        json
+        search_json
     }
 
     /// Returns the declared columns of a result.
-    pub(crate) fn columns(&self, plan: &Plan) -> Vec<DeclaredColumn> {
+    pub(crate) fn declared_columns(&self, plan: &Plan) -> Vec<DeclaredColumn> {
         into_declarations(self.row_columns(plan))
     }
 
     fn row_columns(&self, plan: &Plan) -> Vec<DwellColumn> {
         let channels = &compared_channels(plan);
         let measures = &plan.model.measures;
-        let mut columns = columns::columns(channels, measures, self.sections > 0);
+        let mut columns = columns::dwell_columns(channels, measures, self.sections > 0);
         columns.extend(self.carry.is_some().then(columns::carried_columns).into_iter().flatten());
         columns
     }
@@ -167,7 +167,7 @@ impl AttractorSearch {
 /// The search for attractors, prepared for the rows of a plan.
 pub(crate) struct AttractorEngine {
     search: AttractorSearch,
-    starts: StartRule,
+    start_rule: StartRule,
     columns: Vec<DwellColumn>,
 }
 
@@ -177,14 +177,14 @@ impl AttractorEngine {
         let Recorders { mut gauges, .. } = plan.model.measures.recorders();
         gauges[Gauge::ClashTime as usize] = false;
         let recorders = Recorders { gauges, ..Recorders::default() };
-        let starts = StartRule {
+        let start_rule = StartRule {
             start_count: if search.carry.is_some() { 1 } else { search.starts as usize },
             max_kick_rad_per_s: search.kick,
             max_time_s: search.longest,
             finds_threshold: search.threshold,
             recorders,
         };
-        Self { search, starts, columns: search.row_columns(plan) }
+        Self { search, start_rule, columns: search.row_columns(plan) }
     }
 
     /// Returns the number of rows that a thread computes together. `rows_per_thread` is its part of
@@ -201,7 +201,7 @@ impl AttractorEngine {
 
     /// Returns the row of a point at a speed for which no motion was found.
     pub(crate) fn failed_row(&self, row_index: u64, status: Status) -> PointRows {
-        let failed = DwellRow { attractors: Err(status), motion: 0, turn: 0 };
+        let failed = DwellRow { attractors: Err(status), motion_index: 0, turn_index: 0 };
         point_rows(&self.columns, row_index, [&failed])
     }
 
@@ -219,49 +219,58 @@ impl AttractorEngine {
         let Some(carry) = self.search.carry else {
             let held_speeds: Vec<(HeldSpeed<'_>, CarriedState)> =
                 requested.iter().map(|(_, held_speed)| (*held_speed, None)).collect();
-            let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
+            let results =
+                find_motions(simd, &held_speeds, &self.start_rule, Cancel::When(&is_stopped));
             for ((row, _), result) in requested.iter().zip(results) {
                 sink(self.rows_of_motions(*row, result));
             }
             return;
         };
-        let speeds = speeds_rpm.len() as u64;
-        let groups: Vec<&[(u64, HeldSpeed<'_>)]> =
-            requested.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
-        let mut carried: Vec<CarriedState> = vec![None; groups.len()];
-        for step in 0..speeds {
-            let position = if carry == Carry::Up { step } else { speeds - 1 - step };
+        let speed_count = speeds_rpm.len() as u64;
+        let requests_by_point: Vec<&[(u64, HeldSpeed<'_>)]> =
+            requested.chunk_by(|a, b| a.0 / speed_count == b.0 / speed_count).collect();
+        let mut carried_states: Vec<CarriedState> = vec![None; requests_by_point.len()];
+        for step in 0..speed_count {
+            let position = if carry == Carry::Up { step } else { speed_count - 1 - step };
             // The speeds before the first requested row are needed for its start state.
-            let is_left_to_compute = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
-                Carry::Up => row % speeds >= position,
-                Carry::Down => row % speeds <= position,
+            let must_still_compute = |(row, _): &(u64, HeldSpeed<'_>)| match carry {
+                Carry::Up => row % speed_count >= position,
+                Carry::Down => row % speed_count <= position,
             };
-            let row_at = |k: usize| groups[k][0].0 / speeds * speeds + position;
-            let is_requested = |k: usize| groups[k].iter().any(|(row, _)| *row == row_at(k));
+            let row_at_speed =
+                |k: usize| requests_by_point[k][0].0 / speed_count * speed_count + position;
+            let is_requested =
+                |k: usize| requests_by_point[k].iter().any(|(row, _)| *row == row_at_speed(k));
             let mut groups_to_compute = Vec::new();
-            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_left_to_compute)) {
+            for k in (0..requests_by_point.len())
+                .filter(|k| requests_by_point[*k].iter().any(must_still_compute))
+            {
                 match Some(k)
                     .filter(|k| !is_requested(*k))
-                    .and_then(|k| context.find_known_row(row_at(k)))
+                    .and_then(|k| context.find_known_row(row_at_speed(k)))
                 {
-                    Some(known) => carried[k] = columns::carried_state(&known),
+                    Some(known) => carried_states[k] = columns::read_carried_state(&known),
                     None => groups_to_compute.push(k),
                 }
             }
-            let held_speed = |k: &usize| {
+            let held_speed_and_state = |k: &usize| {
                 let speed_rpm = speeds_rpm[position as usize];
-                (HeldSpeed { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
+                (
+                    HeldSpeed { point: requests_by_point[*k][0].1.point, speed_rpm },
+                    carried_states[*k],
+                )
             };
             let held_speeds: Vec<(HeldSpeed<'_>, CarriedState)> =
-                groups_to_compute.iter().map(held_speed).collect();
-            let results = find_motions(simd, &held_speeds, &self.starts, Cancel::When(&is_stopped));
+                groups_to_compute.iter().map(held_speed_and_state).collect();
+            let results =
+                find_motions(simd, &held_speeds, &self.start_rule, Cancel::When(&is_stopped));
             if is_stopped() {
                 return;
             }
             for (k, result) in groups_to_compute.into_iter().zip(results) {
-                carried[k] = result.as_ref().ok().and_then(final_state);
+                carried_states[k] = result.as_ref().ok().and_then(carried_final_state);
                 if is_requested(k) {
-                    sink(self.rows_of_motions(row_at(k), result));
+                    sink(self.rows_of_motions(row_at_speed(k), result));
                 }
             }
         }
@@ -281,7 +290,11 @@ impl AttractorEngine {
         let mut rows = Vec::new();
         for motion in 0..result.attractors.len() {
             for turn in 0..result.attractors[motion].sections.len().max(1) {
-                rows.push(DwellRow { attractors: Ok(Arc::clone(&result)), motion, turn });
+                rows.push(DwellRow {
+                    attractors: Ok(Arc::clone(&result)),
+                    motion_index: motion,
+                    turn_index: turn,
+                });
             }
         }
         point_rows(&self.columns, row_index, &rows)
@@ -290,7 +303,7 @@ impl AttractorEngine {
 
 /// Returns the state that the search carries to the next speed; `None` if the motion left the
 /// model's range.
-fn final_state(attractors: &Attractors) -> CarriedState {
+fn carried_final_state(attractors: &Attractors) -> CarriedState {
     let motion = attractors.attractors.first()?;
     (!matches!(motion.status, AttractorStatus::LeftRange { .. })).then_some(motion.end_state)
 }
@@ -320,23 +333,26 @@ mod tests {
         let held_plan = HeldPlan { plan: &plan, speeds_rpm, search: Some(search) };
         let engine = held_plan.engine().unwrap();
         let interrupt = Interrupt::new();
-        let evaluate_rows = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
-            let remaining = Mutex::new(rows);
-            let finished = Mutex::new(Vec::new());
-            let next_row = || lock(&remaining).next().map(|row| (row, Vec::new()));
+        let evaluate_rows_with_known = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
+            let remaining_rows = Mutex::new(rows);
+            let finished_rows = Mutex::new(Vec::new());
+            let next_row = || lock(&remaining_rows).next().map(|row| (row, Vec::new()));
             engine.evaluator.evaluate(
                 &next_row,
-                &|row| lock(&finished).push(row),
+                &|row| lock(&finished_rows).push(row),
                 &RunContext::with_known_rows(&interrupt, known),
             );
-            let mut finished = into_content(finished);
-            finished.sort_by_key(|row: &PointRows| row.point);
-            finished
+            let mut sorted_rows = into_content(finished_rows);
+            sorted_rows.sort_by_key(|row: &PointRows| row.point);
+            sorted_rows
         };
-        let all_rows = evaluate_rows(0..3, &|_| None);
-        assert_eq!(evaluate_rows(2..3, &|row| all_rows.get(row as usize).cloned()), all_rows[2..]);
+        let all_rows = evaluate_rows_with_known(0..3, &|_| None);
+        assert_eq!(
+            evaluate_rows_with_known(2..3, &|row| all_rows.get(row as usize).cloned()),
+            all_rows[2..]
+        );
         // With another known row the result differs, which shows that the row is used and not
         // computed again.
-        assert_ne!(evaluate_rows(2..3, &|_| all_rows.first().cloned()), all_rows[2..]);
+        assert_ne!(evaluate_rows_with_known(2..3, &|_| all_rows.first().cloned()), all_rows[2..]);
     }
 }

@@ -34,7 +34,7 @@ use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 /// Number of parts of a run at whose ends a perturbed run is compared with its original. Basis: an
 /// exponential separation is measured over many of them. Doubling it doubles the memory of the
 /// comparison and, where steps are long, the steps that end at a checkpoint.
-pub(crate) const CHECKPOINTS: u32 = 128;
+pub(crate) const CHECKPOINT_COUNT: u32 = 128;
 
 /// The methods by which a row with capped modes was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,12 +49,12 @@ pub(crate) struct CappedRun {
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
     /// The use of the rows, which decides how far they are refined.
-    pub(crate) demand: OutcomePurpose,
+    pub(crate) purpose: OutcomePurpose,
     /// The instruction set of all groups. With `None` each group gets the narrowest that has a lane
     /// for each of its trajectories.
-    forced: Option<Simd>,
+    required_simd: Option<Simd>,
     timing: Timing,
-    rule: RowRule,
+    row_rule: RowRule,
     /// The refinement levels of both models, found when first used.
     pub(crate) levels: Arc<OnceCell<[RefinementLevels; 2]>>,
 }
@@ -64,16 +64,16 @@ pub struct ModelEngine<'a> {
 /// # Errors
 /// Returns an error if this processor has no instruction set of that name.
 pub(crate) fn simd_from_environment() -> Result<Simd, Error> {
-    Ok(forced_simd()?.unwrap_or_else(Simd::widest))
+    Ok(required_simd_from_environment()?.unwrap_or_else(Simd::widest))
 }
 
 /// Returns the instruction set that the variable `SWEEP_SIMD` names, if it is set.
-fn forced_simd() -> Result<Option<Simd>, Error> {
+fn required_simd_from_environment() -> Result<Option<Simd>, Error> {
     let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(None) };
-    let available = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
-    let named = available().find(|simd| simd.name() == name);
-    named.map(Some).ok_or_else(|| {
-        let names = available().map(Simd::name).collect::<Vec<_>>().join(", ");
+    let available_simds = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
+    let matching_simd = available_simds().find(|simd| simd.name() == name);
+    matching_simd.map(Some).ok_or_else(|| {
+        let names = available_simds().map(Simd::name).collect::<Vec<_>>().join(", ");
         Error::Refused(format!("SWEEP_SIMD={name}: expected one that this machine has: {names}"))
     })
 }
@@ -85,25 +85,25 @@ impl<'a> ModelEngine<'a> {
     /// # Errors
     /// Returns an error if this processor has no instruction set of that name.
     pub fn new(plan: &'a Plan) -> Result<Self, Error> {
-        Ok(Self::with_simd(forced_simd()?, plan))
+        Ok(Self::with_simd(required_simd_from_environment()?, plan))
     }
 
     /// Returns an engine for a plan of which one column is read.
     ///
     /// # Errors
     /// Returns the errors of [`Self::new`].
-    pub(crate) fn for_column(plan: &'a Plan, only: Option<&str>) -> Result<Self, Error> {
+    pub(crate) fn for_column(plan: &'a Plan, only_column: Option<&str>) -> Result<Self, Error> {
         // A search for a ratio's limit needs only the side of the limit. The limits of other
         // columns are not known to the engine, so these need complete rows.
-        let has_prefix = |prefix| only.is_some_and(|only| only.starts_with(prefix));
-        let demand = if has_prefix("ratio_") {
+        let column_has_prefix = |prefix| only_column.is_some_and(|only| only.starts_with(prefix));
+        let purpose = if column_has_prefix("ratio_") {
             OutcomePurpose::Side
-        } else if has_prefix("growth_") || has_prefix("dwell_") {
+        } else if column_has_prefix("growth_") || column_has_prefix("dwell_") {
             OutcomePurpose::Growth
         } else {
             OutcomePurpose::Row
         };
-        Ok(Self { demand, ..Self::new(plan)? })
+        Ok(Self { purpose, ..Self::new(plan)? })
     }
 
     /// Returns the engine as commands use it.
@@ -118,10 +118,17 @@ impl<'a> ModelEngine<'a> {
 
     fn with_simd(forced: Option<Simd>, plan: &'a Plan) -> Self {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
-        let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
+        let checkpoints = if is_checked { CHECKPOINT_COUNT } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
         let levels = Arc::default();
-        Self { plan, demand: OutcomePurpose::Row, forced, timing, rule: rule(plan), levels }
+        Self {
+            plan,
+            purpose: OutcomePurpose::Row,
+            required_simd: forced,
+            timing,
+            row_rule: plan_row_rule(plan),
+            levels,
+        }
     }
 
     /// Returns an engine for another plan, with the instruction set and the levels of this one.
@@ -129,7 +136,7 @@ impl<'a> ModelEngine<'a> {
         self.levels();
         ModelEngine {
             levels: Arc::clone(&self.levels),
-            ..ModelEngine::with_simd(self.forced, plan)
+            ..ModelEngine::with_simd(self.required_simd, plan)
         }
     }
 
@@ -145,12 +152,12 @@ impl<'a> ModelEngine<'a> {
     /// Returns [`Self::levels`], or `None` if the context stops the search.
     fn levels_unless_stopped(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
-        let find = || {
-            let found = self.find_levels(Cancel::When(&|| context.must_stop()));
+        let find_levels_or_stop = || {
+            let found_levels = self.find_levels(Cancel::When(&|| context.must_stop()));
             // A search that was stopped may lack levels.
-            if context.must_stop() { Err(()) } else { Ok(found) }
+            if context.must_stop() { Err(()) } else { Ok(found_levels) }
         };
-        self.levels.get_or_try_init(find).ok()
+        self.levels.get_or_try_init(find_levels_or_stop).ok()
     }
 
     /// Returns the methods by which a row of this kind of method was computed; `None` if the kind
@@ -172,13 +179,13 @@ impl<'a> ModelEngine<'a> {
         let corners = self.plan.corners_to_prepare();
         let inputs: Vec<PointInput> =
             corners.iter().map(|values| point_input(self.plan, values)).collect();
-        let prepared = self.prepare(&inputs);
-        let points = prepared
+        let prepared_points = self.prepare(&inputs);
+        let points = prepared_points
             .iter()
             .zip(&inputs)
             .filter_map(|(point, input)| Some((point.as_ref().ok()?, &input.spin)));
-        let steps = StepSelector::until(points, self.plan.end_s, cancel);
-        ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
+        let step_selector = StepSelector::until(points, self.plan.end_s, cancel);
+        ModelKind::ALL.map(|model| refinement_levels(&step_selector, model, self.row_rule.accuracy))
     }
 
     /// Evaluates points, each given by the values of the plan's axes, on the grid or between its
@@ -211,11 +218,11 @@ impl<'a> ModelEngine<'a> {
         context: &RunContext<'_>,
     ) {
         let state = Mutex::default();
-        let changed = Condvar::new();
+        let state_changed = Condvar::new();
         // Estimates time a single thread.
         let is_in_pool = rayon::current_thread_index().is_some();
-        let threads = if is_in_pool { rayon::current_num_threads() } else { 1 };
-        let pool = Pool { engine: self, source, sink, context, threads, state, changed };
+        let thread_count = if is_in_pool { rayon::current_num_threads() } else { 1 };
+        let pool = Pool { engine: self, source, sink, context, thread_count, state, state_changed };
         match is_in_pool {
             true => drop(rayon::broadcast(|_| pool.run_worker())),
             false => pool.run_worker(),
@@ -224,31 +231,35 @@ impl<'a> ModelEngine<'a> {
 
     /// Returns the instruction set of the widest groups.
     pub(crate) fn widest_simd(&self) -> Simd {
-        self.forced.unwrap_or_else(Simd::widest)
+        self.required_simd.unwrap_or_else(Simd::widest)
     }
 
     fn simd_for(&self, trajectories: usize) -> Simd {
-        self.forced.unwrap_or_else(|| Simd::widest().narrowest_for(trajectories))
+        self.required_simd.unwrap_or_else(|| Simd::widest().narrowest_for(trajectories))
     }
 
     /// Prepares points for integration, those with the same window together. A point that cannot be
     /// prepared has its status.
     fn prepare(&self, inputs: &[PointInput]) -> Vec<Result<Point, Status>> {
-        let mut prepared = Vec::with_capacity(inputs.len());
-        for same_window in inputs.chunk_by(|a, b| a.window_s == b.window_s) {
-            let machines: Vec<_> = same_window
+        let mut prepared_points = Vec::with_capacity(inputs.len());
+        for inputs_of_window in inputs.chunk_by(|a, b| a.window_s == b.window_s) {
+            let machines: Vec<_> = inputs_of_window
                 .iter()
                 .map(|PointInput { machine, spin, .. }| (machine.clone(), spin.clone()))
                 .collect();
-            let timing = Timing { window_s: same_window[0].window_s, ..self.timing };
-            let prepare_group = |machines: &[(Machine, Spin)]| {
+            let timing = Timing { window_s: inputs_of_window[0].window_s, ..self.timing };
+            let prepare_machines = |machines: &[(Machine, Spin)]| {
                 let points = prepare(self.simd_for(machines.len()), machines, &timing);
                 points.into_iter().map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
             };
-            let panicked = || Err(Status::Panicked);
-            prepared.extend(map_isolating_panics(&machines, prepare_group, panicked));
+            let panicked_point = || Err(Status::Panicked);
+            prepared_points.extend(map_isolating_panics(
+                &machines,
+                prepare_machines,
+                panicked_point,
+            ));
         }
-        prepared
+        prepared_points
     }
 
     /// Integrates one model at every point with one method. Once the context is stopped, the result
@@ -264,7 +275,7 @@ impl<'a> ModelEngine<'a> {
         let cancel = Cancel::When(&is_stopped);
         let integrate_group = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
-            integrate_points(simd, ModelKind::ALL[model], method, points, &self.rule, cancel)
+            integrate_points(simd, ModelKind::ALL[model], method, points, &self.row_rule, cancel)
                 .unwrap_or_default()
         };
         let panicked = || LevelRun::failed(Status::Panicked);
@@ -273,7 +284,7 @@ impl<'a> ModelEngine<'a> {
 }
 
 /// Returns the measures that rows take from the trajectories of a plan, and the accuracy required.
-pub(crate) fn rule(plan: &Plan) -> RowRule {
+pub(crate) fn plan_row_rule(plan: &Plan) -> RowRule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
         // A single method has no accuracy to reach.
@@ -297,13 +308,15 @@ pub(crate) fn rule(plan: &Plan) -> RowRule {
 pub(crate) fn map_isolating_panics<I, R>(
     items: &[I],
     map_group: impl Fn(&[I]) -> Vec<R>,
-    panicked: impl Fn() -> R,
+    panicked_result: impl Fn() -> R,
 ) -> Vec<R> {
-    let map = |items: &[I]| catch_unwind(AssertUnwindSafe(|| map_group(items))).ok();
-    map(items).unwrap_or_else(|| {
-        let map_one =
-            |item: &I| map(std::slice::from_ref(item)).and_then(|mut results| results.pop());
-        items.iter().map(|item| map_one(item).unwrap_or_else(&panicked)).collect()
+    let map_unless_panicking =
+        |items: &[I]| catch_unwind(AssertUnwindSafe(|| map_group(items))).ok();
+    map_unless_panicking(items).unwrap_or_else(|| {
+        let map_single_item = |item: &I| {
+            map_unless_panicking(std::slice::from_ref(item)).and_then(|mut results| results.pop())
+        };
+        items.iter().map(|item| map_single_item(item).unwrap_or_else(&panicked_result)).collect()
     })
 }
 

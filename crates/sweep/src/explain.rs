@@ -35,7 +35,7 @@ use washer_row::Verdict;
 /// The step between the speeds at which responses are sought (rpm), unless `--speed` gives another.
 /// Basis: the tongues of the paper's machine are wider. Doubling it halves the time and misses
 /// tongues of up to twice the width.
-const STEP_RPM: f64 = 1.0;
+const DEFAULT_SPEED_STEP_RPM: f64 = 1.0;
 
 /// The lowest speed at which responses are sought, as a share of the slowest mode's frequency,
 /// unless `--speed` gives another. Basis: parametric resonances of a mode of frequency f are at
@@ -67,7 +67,8 @@ pub(crate) struct Explanation {
     /// The amplitudes, by channel of the plan, of the same run when it is put on the periodic
     /// response at the entry of each tongue; `None` if no tongue is crossed before the window ends.
     pub(crate) without_departures: Option<Result<Vec<f64>, LeftRangeError>>,
-    /// The deviation of the models, and the part of the tongues in it; `None` without a ratio.
+    /// The deviation of the models, and the share of it that growth in tongues explains; `None`
+    /// without a ratio.
     pub(crate) cause: Option<Cause>,
 }
 
@@ -93,8 +94,8 @@ impl MapResult {
 
     /// Returns the greatest ratio of given nonlinear amplitudes to those of the linear model.
     pub(crate) fn greatest_ratio(&self, nonlinear: &[f64]) -> Option<(f64, Channel)> {
-        let pairs = nonlinear.iter().zip(&self.amplitudes[1]).zip(&self.channels);
-        let ratios = pairs
+        let amplitude_pairs = nonlinear.iter().zip(&self.amplitudes[1]).zip(&self.channels);
+        let ratios = amplitude_pairs
             .filter(|((_, linear), _)| **linear != 0.0)
             .map(|((nonlinear, linear), channel)| (nonlinear / linear, *channel));
         ratios.reduce(|greatest, ratio| if ratio.0 > greatest.0 { ratio } else { greatest })
@@ -168,8 +169,8 @@ fn explain_in_pool(
         finders.push(finder);
     }
     if progress_mode != ProgressMode::None {
-        let scans = finders.iter().zip(&directions);
-        let thread_s: f64 = scans
+        let finders_and_directions = finders.iter().zip(&directions);
+        let thread_s: f64 = finders_and_directions
             .map(|(finder, direction)| {
                 speed_count(direction) as f64 * finder.seconds_per_speed(direction.speeds_to_scan)
             })
@@ -213,14 +214,20 @@ fn explain_in_pool(
     let growing_passages = tongues.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
-    let keeps_limit = |amplitudes: &Vec<f64>| {
+    let is_below_limit = |amplitudes: &Vec<f64>| {
         map_result
             .greatest_ratio(amplitudes)
             .is_some_and(|(ratio, _)| ratio < map_result.limits.upper)
     };
-    let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
-    let cause =
-        cause::find_cause((&point, spin), step_s, &map_result, has_passed, growing_passages);
+    let deviation_has_passed =
+        matches!(&without_departures, Some(Ok(amplitudes)) if is_below_limit(amplitudes));
+    let cause = cause::find_cause(
+        (&point, spin),
+        step_s,
+        &map_result,
+        deviation_has_passed,
+        growing_passages,
+    );
     let tongues = tongues.into_iter().zip(closings).zip(endings).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ending), passages)| {
         (Tongue { closing: Some(closing), ending, ..tongue }, passages)
@@ -244,11 +251,11 @@ fn announce_long_scan(speeds: u64, scan_s: f64) -> Option<String> {
     if total_s < ANNOUNCED_TIME_S {
         return None;
     }
-    let scan = format_duration(scan_s);
-    let total = format_duration(total_s);
+    let scan_text = format_duration(scan_s);
+    let total_text = format_duration(total_s);
     let mut text = format!(
-        "{speeds} speeds take about {scan}; the edges, endings and remedies of unstable bands may \
-         add to {total}"
+        "{speeds} speeds take about {scan_text}; the edges, endings and remedies of unstable \
+         bands may add to {total_text}"
     );
     if total_s > LONG_WORK_S {
         text += "\nit is shorter with fewer speeds (--speed FROM:TO:STEP)";
@@ -280,16 +287,18 @@ fn find_directions(
     input: &PointInput,
     point: &Point,
     [lowest_rpm, highest_rpm]: [f64; 2],
-    requested: Option<Speeds>,
+    requested_speeds: Option<Speeds>,
 ) -> Result<Vec<TurningDirection>, Error> {
     let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
     let from_rpm = (LOWEST_SPEED_RATIO * slowest_rpm).floor().max(1.0);
     let mut directions = Vec::new();
     for (is_backward, fastest_rpm) in [(false, highest_rpm), (true, -lowest_rpm)] {
-        let is_turned = fastest_rpm > 0.0 || !is_backward && lowest_rpm >= 0.0;
-        let speeds_to_scan = match requested {
-            Some(requested) if is_turned => requested,
-            None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
+        let turns_this_way = fastest_rpm > 0.0 || !is_backward && lowest_rpm >= 0.0;
+        let speeds_to_scan = match requested_speeds {
+            Some(requested_speeds) if turns_this_way => requested_speeds,
+            None if fastest_rpm > from_rpm => {
+                Speeds::new(from_rpm, fastest_rpm, DEFAULT_SPEED_STEP_RPM)
+            }
             _ => continue,
         };
         let input = if is_backward { mirror_input(input) } else { input.clone() };
@@ -329,14 +338,15 @@ fn mirror_input(input: &PointInput) -> PointInput {
 fn evaluate_map_result(plan: &Plan, interrupt: &Interrupt) -> Result<MapResult, Error> {
     let engine = ModelEngine::new(plan)?;
     let row = engine.evaluate_only_point(interrupt);
-    let amplitudes = |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
+    let amplitudes_of_model =
+        |model| row.as_ref().map_or_else(Vec::new, |row| row.amplitudes(model));
     Ok(MapResult {
         channels: compared_channels(plan),
         window_s: plan.window_at(&plan.axis_values(0)),
         limits: plan.reliability.limits,
         status: row.as_ref().map_or("", MapRow::status),
         fail_time_s: row.as_ref().and_then(|row| row.number("fail_time_s")),
-        amplitudes: MODEL_NAMES.map(amplitudes),
+        amplitudes: MODEL_NAMES.map(amplitudes_of_model),
         verdict: row.as_ref().map(MapRow::verdict).unwrap_or_default(),
     })
 }
@@ -354,7 +364,7 @@ fn find_crossings(
     map_result: &MapResult,
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
     let end_s = plan.end_s;
-    // Passages in order of time, each with the number of its tongue.
+    // Each passage has the number of its tongue; the passages are in order of time.
     let intervals = tongues.iter().enumerate().flat_map(|(k, tongue)| {
         let [from, to] = tongue.range_rpm;
         let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
@@ -369,13 +379,13 @@ fn find_crossings(
     }
     let mut responses: Vec<[Option<Response>; 2]> = vec![[None, None]; intervals.len()];
     for finder in finders {
-        let has_same_direction =
+        let is_in_direction =
             |number: &usize| tongues[intervals[*number].0].is_backward == finder.is_backward;
-        let numbers: Vec<usize> = (0..intervals.len()).filter(has_same_direction).collect();
-        let ends_s = numbers.iter().flat_map(|&number| intervals[number].1);
+        let interval_numbers: Vec<usize> = (0..intervals.len()).filter(is_in_direction).collect();
+        let ends_s = interval_numbers.iter().flat_map(|&number| intervals[number].1);
         let speeds: Vec<f64> = spin.speeds_rpm(ends_s).map(f64::abs).collect();
         let mut end_responses = finder.find_responses(&speeds).into_iter();
-        for number in numbers {
+        for number in interval_numbers {
             responses[number] = [end_responses.next().flatten(), end_responses.next().flatten()];
         }
     }

@@ -13,7 +13,7 @@ use washer_plot::{Live, Slider};
 use washer_row::{MethodKind, Metric, MetricColumn};
 
 use crate::config::WasherGridInput;
-use crate::engine::{CHECKPOINTS, ModelEngine, rule};
+use crate::engine::{CHECKPOINT_COUNT, ModelEngine, plan_row_rule};
 use crate::method::rk4_mass_scaled;
 use crate::model::Washer;
 use crate::plan::{
@@ -36,23 +36,23 @@ const SLIDER_PARAMETERS: [&str; 6] = [
 
 /// Range of a slider on each side of the plan's value, as a share of it. Basis: a wide range that
 /// machines can have. Doubling it includes values that few machines have.
-const SLIDER_SPREAD: f64 = 0.3;
+const SLIDER_RANGE_RATIO: f64 = 0.3;
 
 /// Maximum number of sliders besides the axes. Basis: levels are chosen for every corner of their
 /// ranges. Doubling it makes 64 times as many corners.
-const MAX_SLIDERS: usize = 6;
+const MAX_FURTHER_SLIDERS: usize = 6;
 
 /// Minimum time between two instants of a history (s). Basis: five instants a turn at 1200 rpm.
 /// Doubling it misses peaks of fast motions.
-const MIN_SPACING_S: f64 = 0.01;
+const MIN_INSTANT_SPACING_S: f64 = 0.01;
 
 /// Maximum number of instants of a history. Basis: the page of a long run stays fast. Doubling it
 /// doubles the time to draw.
-const MAX_INSTANTS: f64 = 8000.0;
+const MAX_HISTORY_INSTANTS: f64 = 8000.0;
 
 /// Step between the speeds at which modes are computed (rpm). Basis: resonances are refined between
 /// these speeds. Doubling it may confuse modes whose frequencies cross.
-const MODE_STEP_RPM: f64 = 10.0;
+const MODE_SPEED_STEP_RPM: f64 = 10.0;
 
 /// A parameter with the ends of its range, from `--slider`.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,10 +69,10 @@ pub struct SliderRange {
 pub(crate) fn parse_slider_range(text: &str) -> Result<SliderRange, String> {
     let expected = "expected NAME=FROM:TO, as in tub_mass_kg=20:30";
     let (name, range) = text.split_once('=').ok_or(expected)?;
-    let (from, to) = range.split_once(':').ok_or(expected)?;
+    let (from_text, to_text) = range.split_once(':').ok_or(expected)?;
     let parse_number =
         |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-    match (parse_number(from), parse_number(to)) {
+    match (parse_number(from_text), parse_number(to_text)) {
         (Some(from), Some(to)) if from < to => {
             Ok(SliderRange { name: name.trim().to_owned(), from, to })
         }
@@ -88,7 +88,7 @@ pub(crate) fn parse_slider_range(text: &str) -> Result<SliderRange, String> {
 /// Returns an error if the file is no map of a grid with its plan, or if no machine can have the
 /// ranges.
 pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
-    let mut plan = plan_from_map(file)?;
+    let mut plan = read_plan_of_map(file)?;
     let has_slow_growth = corners_of_forces(&plan).is_some();
     let (held_speeds_rpm, held_metrics) = take_held_metrics(&mut plan);
     let sliders = match ranges {
@@ -96,21 +96,22 @@ pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Liv
         _ => requested_sliders(&plan, ranges)?,
     };
     let (setup, level_descriptions) = build_setup(&plan, &sliders)?;
-    let axes = plan.axes.iter().map(|axis| to_slider(axis, None));
-    let further = sliders.iter().map(|axis| to_slider(axis, axis.parameter.value));
-    let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
+    let axis_sliders = plan.axes.iter().map(|axis| to_slider(axis, None));
+    let further_sliders = sliders.iter().map(|axis| to_slider(axis, axis.parameter.value));
+    let columns_of_models =
+        |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // The rest of the description is about rows without a ratio, which a page does not have.
-    let ratio = criterion.ratio_description().split(';').next().unwrap_or_default();
+    let ratio_description = criterion.ratio_description().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
-        sliders: axes.chain(further).collect(),
-        every_s: MIN_SPACING_S.max(plan.end_s / MAX_INSTANTS),
+        sliders: axis_sliders.chain(further_sliders).collect(),
+        every_s: MIN_INSTANT_SPACING_S.max(plan.end_s / MAX_HISTORY_INSTANTS),
         end_s: plan.end_s,
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
-        criterion_words: [criterion.amplitude_description(), ratio].map(str::to_owned),
-        metrics: plan.model.measures.model_columns().map(columns).collect(),
+        criterion_words: [criterion.amplitude_description(), ratio_description].map(str::to_owned),
+        metrics: plan.model.measures.model_columns().map(columns_of_models).collect(),
         held_speeds_rpm,
         held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
@@ -131,14 +132,16 @@ pub(crate) fn build_live_part(file: &Path, ranges: &[SliderRange]) -> Result<Liv
 /// Returns the resonances of the machine at the middle of every axis, up to its greatest speed, as
 /// rows of text: motion, speed and damping ratio. A machine without modes has none.
 pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
-    let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.interpolate(0.5)).collect();
-    let PointInput { machine, spin, .. } = point_input(plan, &middle);
+    let middle_values: Vec<f64> =
+        plan.axes.iter().map(|axis| axis.values.interpolate(0.5)).collect();
+    let PointInput { machine, spin, .. } = point_input(plan, &middle_values);
     let greatest_rpm = spin.max_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-    let count = (greatest_rpm / MODE_STEP_RPM).ceil() as u32;
-    let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODE_STEP_RPM * f64::from(k)).collect();
+    let step_count = (greatest_rpm / MODE_SPEED_STEP_RPM).ceil() as u32;
+    let speeds_rpm: Vec<f64> =
+        (0..=step_count).map(|k| MODE_SPEED_STEP_RPM * f64::from(k)).collect();
     let Ok(point) = prepare_point(machine, spin, &timing(plan)) else { return Vec::new() };
     let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
-    let rows = |mode: ModeOverSpeed| {
+    let mode_rows = |mode: ModeOverSpeed| {
         let motion = mode.motion.to_string();
         let rows = mode.resonances.into_iter().map(move |at| {
             let speed = at.speed_rpm;
@@ -147,7 +150,7 @@ pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
         });
         rows.collect::<Vec<_>>()
     };
-    modes.into_iter().flat_map(rows).collect()
+    modes.into_iter().flat_map(mode_rows).collect()
 }
 
 fn to_slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slider {
@@ -162,27 +165,30 @@ fn to_slider(Axis { parameter, values, .. }: &Axis, value: Option<f64>) -> Slide
 }
 
 /// Returns the plan of a map.
-fn plan_from_map(file: &Path) -> Result<Plan, Error> {
+fn read_plan_of_map(file: &Path) -> Result<Plan, Error> {
     let refuse = |expected: &str| Error::option("--live", file.display(), expected);
     let map = ParquetFile::open(file)?;
-    let json = map.json(key::PLAN);
-    let mut json = json.ok_or_else(|| refuse("a map by `sweep run`, which carries its plan"))?;
+    let plan_json = map.json(key::PLAN);
+    let mut json =
+        plan_json.ok_or_else(|| refuse("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
         let plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
         return if plan.axes.is_empty() { Err(refuse("a map with an axis")) } else { Ok(plan) };
     }
-    // The axes of a design with ranges have these; those of a list and of distributions have the
-    // ranges of the file's columns.
+    // An axis of a design with ranges has its range in the design. An axis of a list or of a
+    // distribution has the range of the file's column.
     let axes = json["axis"].take();
     let mut plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
     let columns = read_overview(&map)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
         let parameter = plan.model.find(name);
-        let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
+        let [range_from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
         let column_range = || columns.iter().find(|column| column.name == name)?.range;
-        if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(column_range)) {
+        if let (Ok(parameter), Some((from, to))) =
+            (parameter, range_from.zip(to).or_else(column_range))
+        {
             plan.axes.push(axis_between(parameter, from, to));
         }
     }
@@ -193,29 +199,30 @@ fn plan_from_map(file: &Path) -> Result<Plan, Error> {
 /// their speeds (rpm) and the metrics.
 fn take_held_metrics(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
     let Washer { measures, held_speeds, .. } = &mut plan.model;
-    let held = measures.metrics.extract_if(.., |metric| metric.is_at_held_speeds()).collect();
+    let held_metrics =
+        measures.metrics.extract_if(.., |metric| metric.is_at_held_speeds()).collect();
     let speeds = held_speeds.take();
-    (speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec()), held)
+    (speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec()), held_metrics)
 }
 
 /// Returns sliders about the plan's values, for the ranges that machines can have.
 fn usual_sliders(plan: &Plan) -> Vec<Axis> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name == name);
     let names = SLIDER_PARAMETERS.into_iter().filter(|name| !is_axis(name));
-    let range = |name| {
+    let possible_range = |name| {
         let parameter = plan.model.find(name).ok()?;
         let value = parameter.value.filter(|value| *value != 0.0)?;
-        let ends = [(1.0 - SLIDER_SPREAD) * value, (1.0 + SLIDER_SPREAD) * value];
-        let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
+        let range_ends = [(1.0 - SLIDER_RANGE_RATIO) * value, (1.0 + SLIDER_RANGE_RATIO) * value];
+        let [from, to] = if value > 0.0 { range_ends } else { [range_ends[1], range_ends[0]] };
         let range = axis_between(parameter, from, to);
-        is_possible(plan, std::slice::from_ref(&range)).then_some(range)
+        has_possible_machines(plan, std::slice::from_ref(&range)).then_some(range)
     };
-    names.filter_map(range).collect()
+    names.filter_map(possible_range).collect()
 }
 
 /// Returns the sliders of `--slider`.
 fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
-    let mut found: Vec<Axis> = Vec::new();
+    let mut requested: Vec<Axis> = Vec::new();
     for SliderRange { name, from, to } in ranges {
         let refuse =
             |expected: String| Error::option("--slider", format!("{name}={from}:{to}"), expected);
@@ -223,29 +230,31 @@ fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, E
             .model
             .find(name)
             .map_err(|why| refuse(format!("a name of `sweep parameters`: {why}")))?;
-        let has_slider = plan.axes.iter().chain(&found).any(|axis| axis.parameter == parameter);
+        let has_slider = plan.axes.iter().chain(&requested).any(|axis| axis.parameter == parameter);
         let has_several_values = parameter.value.is_none();
         let range = parameter.range;
-        let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
-        found.push(axis_between(parameter, *from, *to));
-        let expected = match beyond {
+        let disallowed_end = [*from, *to].into_iter().find(|end| !range.contains(*end));
+        requested.push(axis_between(parameter, *from, *to));
+        let expected = match disallowed_end {
             _ if has_slider => "a parameter that has no slider yet".to_owned(),
             _ if has_several_values => "a parameter that has one value in this map".to_owned(),
             Some(end) => format!("{} at both ends", range.describe_for(end)),
-            None if found.len() > MAX_SLIDERS => format!("at most {MAX_SLIDERS} sliders"),
-            None if !is_possible(plan, &found) => {
+            None if requested.len() > MAX_FURTHER_SLIDERS => {
+                format!("at most {MAX_FURTHER_SLIDERS} sliders")
+            }
+            None if !has_possible_machines(plan, &requested) => {
                 "values that a machine can have together".to_owned()
             }
             None => continue,
         };
         return Err(refuse(expected));
     }
-    Ok(found)
+    Ok(requested)
 }
 
-/// Whether all corners of these ranges have a possible machine and spin.
-fn is_possible(plan: &Plan, sliders: &[Axis]) -> bool {
-    let plan = with_sliders(plan, sliders);
+/// Returns whether all corners of these ranges have a possible machine and spin.
+fn has_possible_machines(plan: &Plan, sliders: &[Axis]) -> bool {
+    let plan = plan_with_sliders(plan, sliders);
     plan.corners_to_prepare().iter().all(|corner| {
         let input = point_input(&plan, corner);
         input.machine.violations().is_empty() && input.spin.violations().is_empty()
@@ -253,18 +262,18 @@ fn is_possible(plan: &Plan, sliders: &[Axis]) -> bool {
 }
 
 /// Returns the plan with the sliders as further axes.
-fn with_sliders(plan: &Plan, sliders: &[Axis]) -> Plan {
+fn plan_with_sliders(plan: &Plan, sliders: &[Axis]) -> Plan {
     Plan { axes: [&plan.axes, sliders].concat(), ..plan.clone() }
 }
 
 /// Returns the setup, and a description of each model's refinement levels.
 fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
     // A page uses the fast method, with the accuracy of the map's method if it has one.
-    let map_accuracy = rule(plan).accuracy;
+    let map_accuracy = plan_row_rule(plan).accuracy;
     let accuracy = if map_accuracy.is_finite() { map_accuracy } else { ACCURACY.default };
     let plan = &Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let levels = ModelEngine::new(plan)?.levels().clone();
-    let wide_plan = with_sliders(plan, sliders);
+    let wide_plan = plan_with_sliders(plan, sliders);
     let wide_levels = ModelEngine::new(&wide_plan)?.levels().clone();
     let level_descriptions = ModelKind::ALL.map(|model| {
         levels[model as usize].levels.iter().map(|level| level.describe(model)).collect()
@@ -273,8 +282,8 @@ fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]
     let setup = Setup {
         machine: plan.model.machine.clone(),
         spin: plan.model.spin.clone(),
-        checkpoints: CHECKPOINTS,
-        rule: rule(plan),
+        checkpoints: CHECKPOINT_COUNT,
+        rule: plan_row_rule(plan),
         sliders: Sliders { parameters, axis_count: plan.axes.len() },
         levels,
         wide_levels,

@@ -13,7 +13,7 @@ use washer_row::MAX_ADAPTIVE_STEPS;
 pub(crate) const REFERENCE_STEP_RATIO: f64 = 0.75;
 
 /// The accuracy of the fast method. Below 1e-4 its levels agree on ringing that none resolves.
-const LEVELS_ACCURACY: Setting = Setting {
+const ACCURACY_OF_LEVELS: Setting = Setting {
     range: Range::Within(1e-4, 1e-2),
     description: "relative error of a row's numbers",
     help: "for less take `method = \"rk4\"` with `step_s = 2e-4`, which leaves some 1e-8",
@@ -35,7 +35,7 @@ pub(crate) static METHODS: [IntegrationMethod; 4] = [
         name: "rk4-mass-scaled",
         description: "the fast method: capped modes of the bearings, at finer and finer levels \
                       until two agree",
-        settings: &[LEVELS_ACCURACY],
+        settings: &[ACCURACY_OF_LEVELS],
         step_rule: StepRule::Checked,
     },
 ];
@@ -79,28 +79,31 @@ mod tests {
 
     #[test]
     fn a_row_of_the_table_says_what_its_method_does() {
-        for table_row in METHODS.iter() {
-            let method = table_row.with_defaults();
-            assert_eq!(method.name(), table_row.name);
-            let keys: Vec<_> = table_row.settings.iter().map(|setting| setting.key).collect();
+        for table_entry in METHODS.iter() {
+            let method = table_entry.with_defaults();
+            assert_eq!(method.name(), table_entry.name);
+            let keys: Vec<_> = table_entry.settings.iter().map(|setting| setting.key).collect();
             let settings = method.settings();
             assert_eq!(settings.iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
-            for (setting, (key, value)) in table_row.settings.iter().zip(settings) {
+            for (setting, (key, value)) in table_entry.settings.iter().zip(settings) {
                 assert!(setting.range.contains(value), "{key} = {value}");
                 assert_eq!(method.to_json()[key], value);
             }
             if let Some(direct) = direct_method(&method) {
-                assert_eq!(direct.kind.name(), table_row.name, "a row names its method");
+                assert_eq!(direct.kind.name(), table_entry.name, "a row names its method");
             }
         }
     }
 
     #[test]
     fn a_key_means_the_same_to_every_method() {
-        let all = || METHODS.iter().flat_map(|table_row| table_row.settings);
-        for (one, other) in all().flat_map(|one| all().map(move |other| (one, other))) {
-            let means_same = (one.range, one.default) == (other.range, other.default);
-            assert!(one.key != other.key || means_same, "{}", one.key);
+        let all_settings = || METHODS.iter().flat_map(|table_row| table_row.settings);
+        for (setting_a, other) in
+            all_settings().flat_map(|setting_a| all_settings().map(move |other| (setting_a, other)))
+        {
+            let is_same_setting =
+                (setting_a.range, setting_a.default) == (other.range, other.default);
+            assert!(setting_a.key != other.key || is_same_setting, "{}", setting_a.key);
         }
     }
 

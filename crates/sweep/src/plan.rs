@@ -40,8 +40,8 @@ pub(crate) fn write_axis_values(plan: &Plan, input: &mut PointInput, axis_values
 /// Returns the channels that a plan compares.
 pub(crate) fn compared_channels(plan: &Plan) -> Vec<Channel> {
     let channels = plan.reliability.channels.iter();
-    let find = |name| Channel::ALL.into_iter().find(|channel| channel.name() == name);
-    channels.filter_map(|channel| find(channel.name)).collect()
+    let find_channel = |name| Channel::ALL.into_iter().find(|channel| channel.name() == name);
+    channels.filter_map(|channel| find_channel(channel.name)).collect()
 }
 
 /// Returns an axis with two values.
@@ -81,10 +81,17 @@ pub(crate) fn failure_reason(plan: &Plan, point: u64) -> Option<String> {
 /// its dampers, by their names.
 pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {
     let speeds = point.friction_speeds().iter();
-    speeds.map(|it| (format!("damper_{}", it.damper_index + 1), it.speed_m_per_s.into())).collect()
+    speeds
+        .map(|friction_speed| {
+            (
+                format!("damper_{}", friction_speed.damper_index + 1),
+                friction_speed.speed_m_per_s.into(),
+            )
+        })
+        .collect()
 }
 
-/// Whether some damper has friction at some point of a plan.
+/// Returns whether some damper has friction at some point of a plan.
 pub(crate) fn has_friction(plan: &Plan) -> bool {
     plan.model.machine.dampers.iter().any(|damper| damper.friction_n != 0.0)
         || plan.axes.iter().any(|axis| axis.parameter.name.ends_with("friction_n"))
@@ -110,10 +117,10 @@ mod tests {
     use washer_model::{Machine, MachineParameter, Profile, Spin};
     use washer_row::Measures;
 
-    fn plan(axes: &[(&str, AxisValues)]) -> Plan {
+    fn plan_with_axes(axes: &[(&str, AxisValues)]) -> Plan {
         let machine = Machine::paper();
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
-        let axis = |(name, values): &(&str, AxisValues)| Axis {
+        let axis_of_values = |(name, values): &(&str, AxisValues)| Axis {
             parameter: crate::model::engine_parameter(
                 MachineParameter::find(name, &machine, &spin).unwrap(),
                 &machine,
@@ -124,7 +131,7 @@ mod tests {
         };
         Plan {
             name: "test".to_owned(),
-            axes: axes.iter().map(axis).collect(),
+            axes: axes.iter().map(axis_of_values).collect(),
             design: None,
             model: Washer { machine, spin, measures: Measures::default(), held_speeds: None },
             end_s: 50.0,
@@ -142,16 +149,16 @@ mod tests {
 
     #[test]
     fn the_first_axis_varies_slowest() {
-        let plan = plan(&[
+        let plan = plan_with_axes(&[
             ("unbalance_mass_kg", AxisValues::List(vec![0.1, 0.2])),
             ("damping_n_s_per_m", AxisValues::Linear { from: 60.0, to: 80.0, count: 3 }),
         ]);
         assert_eq!(plan.points(), 6);
-        let order: Vec<_> = (0..6).map(|p| plan.axis_values(p)).collect();
-        let expected =
+        let points_in_order: Vec<_> = (0..6).map(|p| plan.axis_values(p)).collect();
+        let expected_points =
             [[0.1, 60.0], [0.1, 70.0], [0.1, 80.0], [0.2, 60.0], [0.2, 70.0], [0.2, 80.0]]
                 .map(Vec::from);
-        assert_eq!(order, expected);
+        assert_eq!(points_in_order, expected_points);
         let input = point_input(&plan, &plan.axis_values(4));
         assert_eq!(input.machine.unbalance.mass_kg, 0.2);
         assert!(input.machine.dampers.iter().all(|d| d.damping_n_s_per_m == 70.0));
@@ -160,7 +167,7 @@ mod tests {
 
     #[test]
     fn corners_are_the_extreme_points_even_of_unordered_lists() {
-        let plan = plan(&[
+        let plan = plan_with_axes(&[
             ("unbalance_mass_kg", AxisValues::List(vec![0.3, 0.1, 0.2])),
             ("damping_n_s_per_m", AxisValues::Linear { from: 80.0, to: 60.0, count: 3 }),
         ]);
@@ -171,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_plan_without_axes_is_one_point() {
-        let plan = plan(&[]);
+        let plan = plan_with_axes(&[]);
         assert_eq!(plan.points(), 1);
         assert_eq!((plan.corner_count(), plan.corner_values(0)), (1, Vec::new()));
         assert_eq!(point_input(&plan, &[]).machine, plan.model.machine);
@@ -179,16 +186,16 @@ mod tests {
 
     #[test]
     fn a_design_spreads_its_points_over_the_axes_ranges() {
-        let mut plan = plan(&[
+        let mut plan = plan_with_axes(&[
             ("unbalance_mass_kg", AxisValues::Linear { from: 0.1, to: 0.9, count: 2 }),
             ("bearing_stiffness_n_per_m", AxisValues::Log { from: 1e6, to: 1e8, count: 2 }),
         ]);
         plan.design = Some(Design::Spread { rule: DesignRule::Sobol, points: 1024, seed: 1 });
         assert_eq!(plan.points(), 1024);
         let points: Vec<Vec<f64>> = (0..1024).map(|point| plan.axis_values(point)).collect();
-        let below =
+        let count_below =
             |axis: usize, middle: f64| points.iter().filter(|point| point[axis] < middle).count();
-        assert_eq!([below(0, 0.5), below(1, 1e7)], [512, 512]);
+        assert_eq!([count_below(0, 0.5), count_below(1, 1e7)], [512, 512]);
         assert!(points.iter().all(|p| (0.1..0.9).contains(&p[0]) && (1e6..1e8).contains(&p[1])));
         assert_eq!(plan.corner_count(), 4);
         assert_eq!(point_input(&plan, &points[7]).machine.unbalance.mass_kg, points[7][0]);

@@ -28,10 +28,10 @@ impl FromStr for Speeds {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers: Option<Vec<f64>> =
             text.split(':').map(|part| part.trim().parse().ok()).collect();
-        let Some([from, to, step]) = numbers.as_deref() else {
+        let Some([from_rpm, to_rpm, step_rpm]) = numbers.as_deref() else {
             return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
         };
-        Self::new(*from, *to, *step).check()
+        Self::new(*from_rpm, *to_rpm, *step_rpm).check()
     }
 }
 
@@ -42,14 +42,16 @@ impl Speeds {
 
     fn check(self) -> Result<Self, String> {
         let Self { from_rpm: from, to_rpm: to, step_rpm: step } = self;
-        let count = (to - from) / step;
+        let speed_count = (to - from) / step;
         if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
             return Err(
                 "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
             );
         }
-        if count > MAX_SPEEDS {
-            return Err(format!("these are {count:.0} speeds, expected at most {MAX_SPEEDS}"));
+        if speed_count > MAX_SPEEDS {
+            return Err(format!(
+                "these are {speed_count:.0} speeds, expected at most {MAX_SPEEDS}"
+            ));
         }
         Ok(self)
     }
@@ -57,12 +59,14 @@ impl Speeds {
     /// Returns the speeds whose [`Self::values`] are these within rounding; `None` if they are not
     /// equally spaced.
     pub(crate) fn from_values(speeds_rpm: &[f64]) -> Option<Self> {
-        let (&[from, second, ..], &[.., to]) = (speeds_rpm, speeds_rpm) else { return None };
-        let speeds = Self::new(from, to, second - from).check().ok()?;
-        let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
+        let (&[from_rpm, second, ..], &[.., to_rpm]) = (speeds_rpm, speeds_rpm) else {
+            return None;
+        };
+        let speeds = Self::new(from_rpm, to_rpm, second - from_rpm).check().ok()?;
+        let is_within_rounding = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to_rpm;
         let values = speeds.values();
-        let is_equally_spaced =
-            values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(is_close);
+        let is_equally_spaced = values.len() == speeds_rpm.len()
+            && values.iter().zip(speeds_rpm).all(is_within_rounding);
         is_equally_spaced.then_some(speeds)
     }
 
@@ -127,9 +131,9 @@ impl FromStr for SpeedList {
         if values_rpm.last().is_some_and(|last| *last > MAX_HELD_SPEED_RPM) {
             return Err(format!("expected at most {MAX_HELD_SPEED_RPM} rpm"));
         }
-        let count = values_rpm.len();
-        if count as f64 > MAX_SPEEDS + 1.0 {
-            return Err(format!("these are {count} speeds, expected at most {MAX_SPEEDS}"));
+        let speed_count = values_rpm.len();
+        if speed_count as f64 > MAX_SPEEDS + 1.0 {
+            return Err(format!("these are {speed_count} speeds, expected at most {MAX_SPEEDS}"));
         }
         Ok(Self { text: text.split_whitespace().collect(), values_rpm })
     }
@@ -155,9 +159,12 @@ mod tests {
 
     #[test]
     fn a_list_has_single_and_equally_spaced_speeds() {
-        let values = |text: &str| text.parse::<SpeedList>().map(|list| list.values_rpm);
-        assert_eq!(values("250").unwrap(), [250.0]);
-        assert_eq!(values("240, 250:260:5,305.5").unwrap(), [240.0, 250.0, 255.0, 260.0, 305.5]);
+        let parse_list = |text: &str| text.parse::<SpeedList>().map(|list| list.values_rpm);
+        assert_eq!(parse_list("250").unwrap(), [250.0]);
+        assert_eq!(
+            parse_list("240, 250:260:5,305.5").unwrap(),
+            [240.0, 250.0, 255.0, 260.0, 305.5]
+        );
         assert_eq!("60:400:1".parse::<SpeedList>().unwrap().to_string(), "60:400:1");
         for (text, expected) in [
             ("", "above 0 rpm"),
@@ -168,18 +175,18 @@ mod tests {
             ("240:250:5,250", "rising"),
             ("0:10:1", "above 0 rpm"),
         ] {
-            let refused = values(text).unwrap_err();
-            assert!(refused.contains(expected), "{text}: {refused}");
+            let refusal_message = parse_list(text).unwrap_err();
+            assert!(refusal_message.contains(expected), "{text}: {refusal_message}");
         }
     }
 
     #[test]
     fn speeds_are_equally_spaced_and_include_the_end() {
-        let values = |text: &str| text.parse::<Speeds>().map(Speeds::values);
-        assert_eq!(values("0:40:10").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
-        assert_eq!(values("0:25:10").unwrap(), [0.0, 10.0, 20.0, 25.0]);
-        assert_eq!(values("5:6:100").unwrap(), [5.0, 6.0]);
-        assert_eq!(values("0:0.3:0.1").unwrap().len(), 4);
+        let parse_spaced = |text: &str| text.parse::<Speeds>().map(Speeds::values);
+        assert_eq!(parse_spaced("0:40:10").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
+        assert_eq!(parse_spaced("0:25:10").unwrap(), [0.0, 10.0, 20.0, 25.0]);
+        assert_eq!(parse_spaced("5:6:100").unwrap(), [5.0, 6.0]);
+        assert_eq!(parse_spaced("0:0.3:0.1").unwrap().len(), 4);
         for (text, expected) in [
             ("", "FROM:TO:STEP"),
             ("0:1", "FROM:TO:STEP"),
@@ -191,18 +198,18 @@ mod tests {
             ("0:inf:1", "TO above FROM"),
             ("0:1e9:1", "at most"),
         ] {
-            let refused = values(text).unwrap_err();
-            assert!(refused.contains(expected), "{text}: {refused}");
+            let refusal_message = parse_spaced(text).unwrap_err();
+            assert!(refusal_message.contains(expected), "{text}: {refusal_message}");
         }
         for text in ["0:40:10", "0:25:10", "5:6:100", "0:0.3:0.1", "60:400:1"] {
             let speeds: Speeds = text.parse().unwrap();
-            let again = Speeds::from_values(&speeds.values()).unwrap();
-            assert_eq!(again.values().len(), speeds.values().len(), "{text}");
+            let reparsed_speeds = Speeds::from_values(&speeds.values()).unwrap();
+            assert_eq!(reparsed_speeds.values().len(), speeds.values().len(), "{text}");
         }
-        for uneven in
+        for unequal_speeds in
             [&[][..], &[1.0], &[1.0, 1.0], &[1.0, 2.0, 4.0], &[2.0, 1.0], &[1.0, f64::NAN]]
         {
-            assert_eq!(Speeds::from_values(uneven), None, "{uneven:?}");
+            assert_eq!(Speeds::from_values(unequal_speeds), None, "{unequal_speeds:?}");
         }
         assert!(parse_speeds_above_zero("0:10:1").unwrap_err().contains("above 0 rpm"));
         assert!(

@@ -31,7 +31,7 @@ const POINTS_PER_BATCH: u64 = 8;
 /// Minimum and maximum number of rows that a thread computes together. Basis: fewer than the
 /// minimum leave lanes empty, and more than the maximum delay the first rows. Doubling the maximum
 /// doubles this delay.
-const ROWS_PER_BATCH: [u64; 2] = [32, 2048];
+const MIN_AND_MAX_ROWS_PER_BATCH: [u64; 2] = [32, 2048];
 
 /// Refuses a grid with an axis of the spin, which contradicts held speeds, or of the window, which
 /// has no meaning at held speeds. `option` is the name of the option that gave the speeds, and
@@ -41,19 +41,19 @@ const ROWS_PER_BATCH: [u64; 2] = [32, 2048];
 ///
 /// Returns [`Error::Refused`] for such an axis.
 pub(crate) fn check_axes(plan: &Plan, option: &'static str, text: &str) -> Result<(), Error> {
-    let refuse = |expected: String| Err(Error::option(option, text, expected));
+    let refuse_axis = |expected: String| Err(Error::option(option, text, expected));
     for axis in &plan.axes {
         let name = &axis.parameter.name;
         match axis.parameter.handle.target() {
             Target::Spin => {
-                return refuse(format!(
+                return refuse_axis(format!(
                     "a grid without the axis `{name}`: here the drum is held at each speed of \
                      {option}, whatever its profile; remove the axis, and give its range as \
                      {option}"
                 ));
             }
             Target::Window(_) => {
-                return refuse(format!(
+                return refuse_axis(format!(
                     "a grid without the axis `{name}`: a periodic response is the same in every \
                      turn, and has no window; remove the axis"
                 ));
@@ -92,9 +92,9 @@ impl<'a> HeldPlan<'a> {
 
     /// Returns the path of the result, by default one in `results`.
     pub(crate) fn output(&self, out: Option<&Path>) -> PathBuf {
-        let default =
+        let default_path =
             || format!("results/{}-{}.parquet", self.plan.name, self.command_name()).into();
-        out.map_or_else(default, Path::to_owned)
+        out.map_or_else(default_path, Path::to_owned)
     }
 
     /// Returns the job of the engine, with one or several rows for each point and speed.
@@ -102,8 +102,8 @@ impl<'a> HeldPlan<'a> {
         let Self { plan, speeds_rpm, search } = *self;
         let (columns, options, metadata) = match search {
             Some(search) => {
-                let options = search.json(speeds_rpm);
-                (search.columns(plan), options.clone(), (key::DWELL, options))
+                let options = search.to_json(speeds_rpm);
+                (search.declared_columns(plan), options.clone(), (key::DWELL, options))
             }
             None => {
                 let options = json!({ "speed_rpm": speeds_rpm });
@@ -118,23 +118,23 @@ impl<'a> HeldPlan<'a> {
             "constant spin of the shaft",
             CellType::Axis,
         ));
-        let speeds = speeds_rpm.len() as u64;
+        let speed_count = speeds_rpm.len() as u64;
         let layout = Layout {
             axes,
             columns,
             kind: self.kind(),
-            tasks_per_point: speeds,
+            tasks_per_point: speed_count,
             has_several_rows: true,
             metadata: vec![metadata],
         };
         let mut job = Job::new(plan);
         job.plan[self.command_name()] = options;
         Job {
-            points: plan.points() * speeds,
+            points: plan.points() * speed_count,
             layout,
             axis_values: Box::new(move |row| {
-                let mut values = plan.axis_values(row / speeds);
-                values.push(speeds_rpm[(row % speeds) as usize]);
+                let mut values = plan.axis_values(row / speed_count);
+                values.push(speeds_rpm[(row % speed_count) as usize]);
                 values
             }),
             ..job
@@ -186,26 +186,28 @@ impl HeldSpeedEvaluator<'_> {
     fn evaluate_rows(&self, rows: &[u64], sink: &RowSink<'_>, context: &RunContext<'_>) {
         // Rows of a stopped search are meaningless.
         let is_stopped = || context.must_stop();
-        let store = |rows| {
+        let pass_unless_stopped = |rows| {
             if !is_stopped() {
                 sink(rows)
             }
         };
-        let speeds = self.held_plan.speeds_rpm.len() as u64;
-        let mut point_indices: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
+        let speed_count = self.held_plan.speeds_rpm.len() as u64;
+        let mut point_indices: Vec<u64> = rows.iter().map(|row| row / speed_count).collect();
         point_indices.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             point_indices.iter().copied().zip(self.prepare(&point_indices)).collect();
         let mut requests = Vec::new();
         for &row in rows {
-            let speed_rpm = self.held_plan.speeds_rpm[(row % speeds) as usize];
-            match &points[&(row / speeds)] {
+            let speed_rpm = self.held_plan.speeds_rpm[(row % speed_count) as usize];
+            match &points[&(row / speed_count)] {
                 Ok(point) => requests.push((row, HeldSpeed { point, speed_rpm })),
                 Err(status) => match &self.analysis {
                     HeldAnalysis::Responses(columns) => {
-                        columns.pass(&Outcome::failed(row, *status), &store);
+                        columns.pass(&Outcome::failed(row, *status), &pass_unless_stopped);
                     }
-                    HeldAnalysis::Attractors(engine) => store(engine.failed_row(row, *status)),
+                    HeldAnalysis::Attractors(engine) => {
+                        pass_unless_stopped(engine.failed_row(row, *status))
+                    }
                 },
             }
         }
@@ -216,14 +218,20 @@ impl HeldSpeedEvaluator<'_> {
                 for ((row, _), result) in
                     requests.iter().zip(find_responses(&held_speeds, Cancel::When(&is_stopped)))
                 {
-                    let failed = |status| Outcome::failed(*row, status);
-                    let outcome =
-                        result.map_or_else(failed, |responses| self.outcome(*row, &responses));
-                    columns.pass(&outcome, &store);
+                    let failed_outcome = |status| Outcome::failed(*row, status);
+                    let outcome = result
+                        .map_or_else(failed_outcome, |responses| self.outcome(*row, &responses));
+                    columns.pass(&outcome, &pass_unless_stopped);
                 }
             }
             HeldAnalysis::Attractors(engine) => {
-                engine.evaluate(self.simd, self.held_plan.speeds_rpm, &requests, &store, context);
+                engine.evaluate(
+                    self.simd,
+                    self.held_plan.speeds_rpm,
+                    &requests,
+                    &pass_unless_stopped,
+                    context,
+                );
             }
         }
     }
@@ -245,18 +253,19 @@ impl HeldSpeedEvaluator<'_> {
     /// coexisting outcomes.
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
         let mut outcomes = responses.iter().map(|response| self.response_outcome(row, response));
-        let first = outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));
-        Outcome { coexisting: outcomes.collect(), ..first }
+        let first_outcome =
+            outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));
+        Outcome { coexisting: outcomes.collect(), ..first_outcome }
     }
 
     fn response_outcome(&self, row: u64, response: &Response) -> Outcome {
         let channels = compared_channels(self.held_plan.plan);
-        let trajectory = |amplitudes: &[f64]| Trajectory {
+        let trajectory_with_peaks = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             ..Trajectory::default()
         };
-        let nonlinear = trajectory(&response.nonlinear_peaks);
-        let linear = trajectory(&response.linear_peaks);
+        let nonlinear = trajectory_with_peaks(&response.nonlinear_peaks);
+        let linear = trajectory_with_peaks(&response.linear_peaks);
         let mut outcome = Outcome::new(row, nonlinear, linear);
         outcome.compare(&channels, self.held_plan.plan.reliability.limits);
         Outcome { growth: Some(Growth::from(response)), ..outcome }
@@ -265,24 +274,24 @@ impl HeldSpeedEvaluator<'_> {
 
 impl Evaluator for HeldSpeedEvaluator<'_> {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
-        let speeds = self.held_plan.speeds_rpm.len() as u64;
+        let speed_count = self.held_plan.speeds_rpm.len() as u64;
         // A small job is divided between all threads.
-        let rows_per_thread = self.held_plan.plan.points().saturating_mul(speeds)
+        let rows_per_thread = self.held_plan.plan.points().saturating_mul(speed_count)
             / rayon::current_num_threads() as u64;
-        let row_count = match &self.analysis {
+        let rows_per_batch = match &self.analysis {
             HeldAnalysis::Responses(_) => rows_per_thread
-                .min(POINTS_PER_BATCH * speeds)
-                .clamp(ROWS_PER_BATCH[0], ROWS_PER_BATCH[1]),
-            HeldAnalysis::Attractors(engine) => engine.rows_per_batch(rows_per_thread, speeds),
+                .min(POINTS_PER_BATCH * speed_count)
+                .clamp(MIN_AND_MAX_ROWS_PER_BATCH[0], MIN_AND_MAX_ROWS_PER_BATCH[1]),
+            HeldAnalysis::Attractors(engine) => engine.rows_per_batch(rows_per_thread, speed_count),
         };
         rayon::broadcast(|_| {
             while !context.must_stop() {
-                let rows = std::iter::from_fn(source).map(|(row, _)| row);
-                let rows: Vec<u64> = rows.take(row_count as usize).collect();
-                if rows.is_empty() {
+                let source_rows = std::iter::from_fn(source).map(|(row, _)| row);
+                let remaining_rows: Vec<u64> = source_rows.take(rows_per_batch as usize).collect();
+                if remaining_rows.is_empty() {
                     break;
                 }
-                self.evaluate_rows(&rows, sink, context);
+                self.evaluate_rows(&remaining_rows, sink, context);
             }
         });
     }

@@ -64,13 +64,14 @@ pub(crate) fn parse_start_value(text: &str) -> Result<StartValue, String> {
     let expected =
         "expected a coordinate q1 to q10 or a speed u1 to u10 with its value, as in q5=0.1";
     let (name, value) = text.split_once('=').ok_or(expected)?;
-    let (is_speed, number) = match name.trim().split_at_checked(1) {
-        Some(("q", number)) => (false, number),
-        Some(("u", number)) => (true, number),
+    let (is_speed, number_text) = match name.trim().split_at_checked(1) {
+        Some(("q", number_text)) => (false, number_text),
+        Some(("u", number_text)) => (true, number_text),
         _ => return Err(expected.to_owned()),
     };
-    let number = number.parse().ok().filter(|number| (1..=COORDINATES).contains(number));
-    let index = number.ok_or(expected)? - 1;
+    let coordinate_number =
+        number_text.parse().ok().filter(|number| (1..=COORDINATES).contains(number));
+    let index = coordinate_number.ok_or(expected)? - 1;
     let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
     let value = value.ok_or(expected)?;
     if !is_speed && value.abs() > MAX_START_DEVIATION {
@@ -94,14 +95,14 @@ pub(crate) fn start_from(values: &[StartValue]) -> InitialDeviation {
 /// # Errors
 /// Returns [`Error::Refused`] if there are more, and if `every_s` is longer than the run.
 pub(crate) fn check_spacing(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Error> {
-    let points = plan.points();
+    let point_count = plan.points();
     let Some(every_s) = every_s else {
-        let mut count = 0.0;
-        for point in 0..points {
+        let mut instant_count = 0.0;
+        for point in 0..point_count {
             // The start is an instant, too.
-            count += 1.0
+            instant_count += 1.0
                 + point_input(plan, &plan.axis_values(point)).spin.turns_within([0.0, plan.end_s]);
-            if count > MAX_INSTANTS {
+            if instant_count > MAX_INSTANTS {
                 let expected = format!(
                     "at most {MAX_INSTANTS} turns of the drum, over all points: an earlier end_s, \
                      or fewer points"
@@ -111,11 +112,11 @@ pub(crate) fn check_spacing(every_s: Option<f64>, plan: &Plan) -> Result<Option<
         }
         return Ok(None);
     };
-    let least = plan.end_s * points as f64 / MAX_INSTANTS;
-    if (least..=plan.end_s).contains(&every_s) {
+    let least_spacing_s = plan.end_s * point_count as f64 / MAX_INSTANTS;
+    if (least_spacing_s..=plan.end_s).contains(&every_s) {
         return Ok(Some(every_s));
     }
-    Err(Error::option("--every", every_s, format!("from {least:e} to {} s", plan.end_s)))
+    Err(Error::option("--every", every_s, format!("from {least_spacing_s:e} to {} s", plan.end_s)))
 }
 
 /// The models, the instants and the quantities of a trace.
@@ -205,25 +206,25 @@ pub(crate) fn trace_one_point(
     let models = integrate(&runs, settings.models, cancel);
     let mut table = Table::new(crate::identity::BUILD);
     let failures = add_columns(&mut table, &runs, &models, settings.extras);
-    let failure = |kind: ModelKind| {
-        let model = settings.models.model_kinds().iter().position(|known| *known == kind);
-        model.and_then(|model| failures[model][0].clone())
+    let failure_of_model = |kind: ModelKind| {
+        let model_index = settings.models.model_kinds().iter().position(|known| *known == kind);
+        model_index.and_then(|model_index| failures[model_index][0].clone())
     };
     table.add_metadata(key::PLAN, &plan.to_json());
-    let mut facts = json!({
+    let mut trace_metadata = json!({
         "at": parameters.into_iter().collect::<BTreeMap<_, _>>(),
         "every_s": settings.every_s,
-        "equilibrium": numbered_values('q', run.point.equilibrium()),
+        "equilibrium": json_of_coordinates('q', run.point.equilibrium()),
         "start": start_json(&settings.start),
         "integrator": run.method_json,
-        "nonlinear_failure": failure(ModelKind::Nonlinear),
-        "linear_failure": failure(ModelKind::Linear),
+        "nonlinear_failure": failure_of_model(ModelKind::Nonlinear),
+        "linear_failure": failure_of_model(ModelKind::Linear),
     });
     let friction_speeds = friction_speeds(&run.point);
     if !friction_speeds.is_empty() {
-        facts["friction_speeds_m_per_s"] = friction_speeds.into();
+        trace_metadata["friction_speeds_m_per_s"] = friction_speeds.into();
     }
-    table.add_metadata(key::TRACE, &facts);
+    table.add_metadata(key::TRACE, &trace_metadata);
     let failures = failures.into_iter().flatten().flatten().collect();
     Ok(TraceTable {
         table,
@@ -253,22 +254,24 @@ pub(crate) fn trace_all_points(
     let runs: Vec<&TraceRun> = numbered_runs.iter().map(|(_, run)| run).collect();
     let models = integrate(&runs, settings.models, cancel);
     let mut table = Table::new(crate::identity::BUILD);
-    let rows = || numbered_runs.iter().map(|(number, run)| (*number, run.times_s.len()));
-    let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
-    table.add_counts("point", "number of the point in its grid", numbers);
+    let point_and_row_counts =
+        || numbered_runs.iter().map(|(number, run)| (*number, run.times_s.len()));
+    let point_numbers = point_and_row_counts().flat_map(|(number, count)| repeat_n(number, count));
+    table.add_counts("point", "number of the point in its grid", point_numbers);
     for (k, axis) in plan.axes.iter().enumerate() {
-        let values = rows()
+        let axis_values = point_and_row_counts()
             .flat_map(|(number, count)| repeat_n(plan.axis_values(number).get(k).copied(), count));
-        table.add_parameter(&axis.parameter, values);
+        table.add_parameter(&axis.parameter, axis_values);
     }
-    let model_failures = add_columns(&mut table, &runs, &models, settings.extras);
+    let failures_by_model = add_columns(&mut table, &runs, &models, settings.extras);
     for (k, (number, _)) in numbered_runs.iter().enumerate() {
-        let messages = model_failures.iter().filter_map(|model| model[k].as_deref());
+        let messages = failures_by_model.iter().filter_map(|model| model[k].as_deref());
         failures.extend(messages.map(|text| format!("point {number}: {text}")));
     }
     table.add_metadata(key::PLAN, &plan.to_json());
-    let facts = json!({ "every_s": settings.every_s, "start": start_json(&settings.start) });
-    table.add_metadata(key::TRACE, &facts);
+    let trace_metadata =
+        json!({ "every_s": settings.every_s, "start": start_json(&settings.start) });
+    table.add_metadata(key::TRACE, &trace_metadata);
     let instants = runs.iter().map(|run| run.times_s.len()).sum();
     TraceTable { table, instants, failures, method: None }
 }
@@ -328,19 +331,22 @@ fn integrate<'a>(
         // threads.
         None => groups.iter().map(integrate_group).collect(),
     };
-    let mut all = grouped_histories.into_iter().flatten();
-    model_kinds.iter().map(|&kind| (kind, all.by_ref().take(runs.len()).collect())).collect()
+    let mut all_histories = grouped_histories.into_iter().flatten();
+    model_kinds
+        .iter()
+        .map(|&kind| (kind, all_histories.by_ref().take(runs.len()).collect()))
+        .collect()
 }
 
 fn start_json(start: &InitialDeviation) -> Value {
     json!({
-        "deviations": numbered_values('q', &start.deviations),
-        "speeds": numbered_values('u', &start.speeds),
+        "deviations": json_of_coordinates('q', &start.deviations),
+        "speeds": json_of_coordinates('u', &start.speeds),
     })
 }
 
 /// Returns ten numbers with the names q1 to q10, or u1 to u10, by the letter.
-fn numbered_values(letter: char, values: &[f64; COORDINATES]) -> Value {
+fn json_of_coordinates(letter: char, values: &[f64; COORDINATES]) -> Value {
     (1..).zip(values).map(|(i, value)| (format!("{letter}{i}"), *value)).collect()
 }
 
@@ -353,24 +359,24 @@ fn choose_methods(
     spin: &Spin,
     capped: Option<CappedRun>,
 ) -> ([Method; 2], Value) {
-    let json_with_row = |[nonlinear, _]: &[Method; 2]| {
-        let mut json = plan.integrator.to_json();
-        json["row"] = nonlinear.kind.name().into();
-        json
+    let method_json_with_row = |[nonlinear, _]: &[Method; 2]| {
+        let mut method_json = plan.integrator.to_json();
+        method_json["row"] = nonlinear.kind.name().into();
+        method_json
     };
     if let Some(CappedRun { methods, .. }) = capped {
-        return (methods, json_with_row(&methods));
+        return (methods, method_json_with_row(&methods));
     }
     if let Some(method) = direct_method(&plan.integrator) {
         return ([method; 2], plan.integrator.to_json());
     }
-    let steps = StepSelector::new([(point, spin)], plan.end_s);
-    let methods = ModelKind::ALL.map(|model| reference_method(&steps, model));
-    let json = match methods[0].kind {
+    let step_selector = StepSelector::new([(point, spin)], plan.end_s);
+    let methods = ModelKind::ALL.map(|model| reference_method(&step_selector, model));
+    let method_json = match methods[0].kind {
         MethodKind::Rk4 => rk4(methods[0].step_s).to_json(),
-        _ => json_with_row(&methods),
+        _ => method_json_with_row(&methods),
     };
-    (methods, json)
+    (methods, method_json)
 }
 
 #[cfg(test)]

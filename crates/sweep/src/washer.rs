@@ -8,7 +8,7 @@ use washer_model::{Channel, Machine, MachineParameter, UnknownParameter};
 use washer_row::{Measures, Metric};
 
 use crate::columns::Columns;
-use crate::config::grid::missing_part;
+use crate::config::grid::find_missing_part;
 use crate::config::{WasherGridInput, read, spin};
 use crate::engine::ModelEngine;
 use crate::identity::BUILD;
@@ -27,7 +27,7 @@ const DEFAULT_CHANNELS: [sweep_parameter::Channel; 6] = [
 ];
 
 /// All channels, in the order of the models' output.
-const CHANNELS: [sweep_parameter::Channel; Channel::ALL.len()] = {
+const ALL_CHANNELS: [sweep_parameter::Channel; Channel::ALL.len()] = {
     let mut channels = [engine_channel(Channel::TubFrontY); Channel::ALL.len()];
     let mut k = 0;
     while k < channels.len() {
@@ -45,22 +45,22 @@ impl Model for Washer {
         model_file: Some(ModelFile { key: "machine", keys: &read::MACHINE_KEYS }),
         start_advice: Some("`sweep init FILE` writes a grid file to start from"),
         required_settings: &[
-            ("growth", HELD_SPEEDS),
-            ("dwell", HELD_SPEEDS),
-            ("foot", CABINET),
-            ("slip", CABINET),
-            ("walk", CABINET),
+            ("growth", HELD_SPEEDS_REQUIREMENT),
+            ("dwell", HELD_SPEEDS_REQUIREMENT),
+            ("foot", CABINET_REQUIREMENT),
+            ("slip", CABINET_REQUIREMENT),
+            ("walk", CABINET_REQUIREMENT),
             ("stop", "a machine with [[stops]]"),
         ],
         further_columns: "; a machine with [cabinet] and feet, with stops, and a grid file with \
                   [stability] have more",
-        ..About::new(BUILD, &CHANNELS, &METHODS)
+        ..About::new(BUILD, &ALL_CHANNELS, &METHODS)
     };
 
     fn blank() -> Self {
         Self {
             machine: Machine::paper(),
-            spin: spin::PLACEHOLDER,
+            spin: spin::PLACEHOLDER_SPIN,
             measures: Measures::default(),
             held_speeds: None,
         }
@@ -72,7 +72,8 @@ impl Model for Washer {
     }
 
     fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
-        MachineParameter::find(name, &self.machine, &self.spin).map(|found| self.parameter(found))
+        MachineParameter::find(name, &self.machine, &self.spin)
+            .map(|machine_parameter| self.parameter(machine_parameter))
     }
 
     fn write(&mut self, parameter: &MachineParameter, value: f64) {
@@ -107,25 +108,26 @@ impl Model for Washer {
     }
 
     fn variants(plan: &Plan) -> Vec<Plan> {
-        let can_have = |metric: &Metric| match metric {
+        let machine_can_have = |metric: &Metric| match metric {
             metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
-            metric => missing_part(*metric, &plan.model.machine).is_none(),
+            metric => find_missing_part(*metric, &plan.model.machine).is_none(),
         };
-        let all: Vec<Metric> = Metric::ALL.into_iter().filter(can_have).collect();
-        let single = all.iter().map(|metric| vec![*metric]);
-        let with_metrics = |metrics: Vec<Metric>| {
+        let possible_metrics: Vec<Metric> =
+            Metric::ALL.into_iter().filter(machine_can_have).collect();
+        let single_metrics = possible_metrics.iter().map(|metric| vec![*metric]);
+        let plan_with_metrics = |metrics: Vec<Metric>| {
             let mut plan = plan.clone();
             plan.model.measures.metrics = metrics;
             plan
         };
-        single.chain([all.clone()]).map(with_metrics).collect()
+        single_metrics.chain([possible_metrics.clone()]).map(plan_with_metrics).collect()
     }
 }
 
 /// The requirement of columns at held speeds.
-const HELD_SPEEDS: &str = "[stability] in the grid file, with the speeds of dwells";
+const HELD_SPEEDS_REQUIREMENT: &str = "[stability] in the grid file, with the speeds of dwells";
 /// The requirement of columns of the cabinet's feet.
-const CABINET: &str = "a machine with [cabinet] and [[feet]]";
+const CABINET_REQUIREMENT: &str = "a machine with [cabinet] and [[feet]]";
 
 #[cfg(test)]
 mod tests {
@@ -152,33 +154,39 @@ mod tests {
     #[test]
     fn a_number_that_a_user_wrote_has_the_user_as_its_source() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = crate::config::machine_file(&Machine::paper(), &NumberSources::default())
-            + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
-        std::fs::write(folder.path().join("own.toml"), machine).unwrap();
-        let grid = folder.path().join("grid.toml");
-        let text = "spin = { profile = \"ramp\", peak_rpm = 120, ramp_s = 2 }\ntime.end_s = 2\n";
-        let sources = |named: &str, sets: &[&str]| {
-            std::fs::write(&grid, format!("{named}{text}")).unwrap();
-            let sets: Vec<String> = sets.iter().copied().map(str::to_owned).collect();
-            let plan = crate::config::load(&grid, &sets).unwrap();
+        let machine_text =
+            crate::config::machine_file(&Machine::paper(), &NumberSources::default())
+                + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
+        std::fs::write(folder.path().join("own.toml"), machine_text).unwrap();
+        let grid_path = folder.path().join("grid.toml");
+        let grid_text =
+            "spin = { profile = \"ramp\", peak_rpm = 120, ramp_s = 2 }\ntime.end_s = 2\n";
+        let source_lookup = |machine_line: &str, set_values: &[&str]| {
+            std::fs::write(&grid_path, format!("{machine_line}{grid_text}")).unwrap();
+            let set_values: Vec<String> = set_values.iter().copied().map(str::to_owned).collect();
+            let plan = crate::config::load(&grid_path, &set_values).unwrap();
             move |name: &str| {
                 let rows = list_parameters(Some(&plan));
                 rows.iter().find(|row| row.parameter.name == name).unwrap().source.clone()
             }
         };
-        let own = sources("machine = \"own.toml\"\n", &["damper_1_damping_n_s_per_m=140"]);
-        let file = folder.path().join("own.toml").display().to_string();
-        assert_eq!(own("tub_mass_kg"), format!("given: {file}"));
-        assert_eq!(own("damper_1_damping_n_s_per_m"), "given: --set");
-        assert_eq!(own("damping_n_s_per_m"), format!("given: --set, {file}"));
-        assert_eq!(own("spring_1_cubic_n_per_m3"), "assumed: none unless given");
-        assert_eq!(own("damper_2_friction_n"), format!("given: {file}"));
+        let own_machine_source =
+            source_lookup("machine = \"own.toml\"\n", &["damper_1_damping_n_s_per_m=140"]);
+        let machine_path = folder.path().join("own.toml").display().to_string();
+        assert_eq!(own_machine_source("tub_mass_kg"), format!("given: {machine_path}"));
+        assert_eq!(own_machine_source("damper_1_damping_n_s_per_m"), "given: --set");
+        assert_eq!(
+            own_machine_source("damping_n_s_per_m"),
+            format!("given: --set, {machine_path}")
+        );
+        assert_eq!(own_machine_source("spring_1_cubic_n_per_m3"), "assumed: none unless given");
+        assert_eq!(own_machine_source("damper_2_friction_n"), format!("given: {machine_path}"));
         // The word "auto" in the file leaves this number to the program.
-        let speed = own("damper_2_friction_linear_speed_m_per_s");
-        assert_eq!(speed, "assumed: that of the linear motion");
-        assert_eq!(own("spin_peak_rpm"), "the grid file's [spin]");
-        let built_in = sources("", &["tub_mass_kg=23.87"]);
-        assert_eq!(built_in("tub_mass_kg"), "given: --set");
-        assert_eq!(built_in("shaft_mass_kg"), "paper, Table 2");
+        let speed_source = own_machine_source("damper_2_friction_linear_speed_m_per_s");
+        assert_eq!(speed_source, "assumed: that of the linear motion");
+        assert_eq!(own_machine_source("spin_peak_rpm"), "the grid file's [spin]");
+        let built_in_source = source_lookup("", &["tub_mass_kg=23.87"]);
+        assert_eq!(built_in_source("tub_mass_kg"), "given: --set");
+        assert_eq!(built_in_source("shaft_mass_kg"), "paper, Table 2");
     }
 }

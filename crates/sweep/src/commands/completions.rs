@@ -39,8 +39,8 @@ mod tests {
             for name in ["boundary", "completions", "--keep-traces", "--version"] {
                 assert!(script.contains(name.trim_start_matches('-')), "{shell}: no {name}");
             }
-            let words = script.split(|c: char| !(c.is_alphanumeric() || c == '-'));
-            let shows_hidden = words.clone().any(|word| word == "reference");
+            let script_words = script.split(|c: char| !(c.is_alphanumeric() || c == '-'));
+            let shows_hidden = script_words.clone().any(|word| word == "reference");
             assert!(!shows_hidden, "{shell} completes what is hidden");
         }
     }

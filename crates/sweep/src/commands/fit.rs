@@ -81,13 +81,13 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
             return Err(Error::option("--column", header, expected));
         }
     }
-    let out =
+    let machine_output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::ModelFile)).transpose()?;
     let case_count = cases.len();
-    let paths =
+    let paths_by_case =
         |path: &PathBuf| (0..case_count).map(|k| add_case_number(path, k)).collect::<Vec<_>>();
-    let curves: Vec<PathBuf> = args.curves.iter().flat_map(paths).collect();
-    let curve_outputs = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
+    let curve_paths: Vec<PathBuf> = args.curves.iter().flat_map(paths_by_case).collect();
+    let curve_outputs = curve_paths.iter().map(|path| Output::begin(path, FileKind::Fit));
     let curve_outputs = curve_outputs.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signal_handlers)?;
     let progress = Progress::for_search(args.execution.progress, 0, "", 0);
@@ -97,16 +97,16 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
     let output = args.out.as_deref();
     let context =
         FitContext { cancel, report_evaluations: &report_progress, output, fresh: args.fresh };
-    let threads = threads::choose_count(args.execution.threads, &threads::read_variable)?;
+    let thread_count = threads::choose_count(args.execution.threads, &threads::read_variable)?;
     let fit_result =
-        threads::build_pool(threads)?.install(|| fit::fit(cases, &args.options, &context))?;
+        threads::build_pool(thread_count)?.install(|| fit::fit(cases, &args.options, &context))?;
     progress.finish();
     let Some(mut fit_result) = fit_result else {
-        let kept = "with --out, its evaluations are kept";
-        tell(&format!("interrupted: {kept}\n     go on  {}", resume_command()));
+        let kept_note = "with --out, its evaluations are kept";
+        tell(&format!("interrupted: {kept_note}\n     go on  {}", resume_command()));
         return Ok(Exit::from_signal(interrupt.signal()));
     };
-    if let (Some(path), Some(out)) = (&args.out, out) {
+    if let (Some(path), Some(out)) = (&args.out, machine_output) {
         let (machine, _) = fit_result.problem.machine(0, &fit_result.x);
         let text = config::machine_file(&machine, &fit_result.problem.number_sources());
         out.finish(
@@ -118,7 +118,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Exit, Error> {
             tell(&note);
         }
     }
-    for (case, (path, file)) in curves.iter().zip(curve_outputs).enumerate() {
+    for (case, (path, file)) in curve_paths.iter().zip(curve_outputs).enumerate() {
         file.finish(&fit_result.curve_table(case).into_bytes(path)?)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
@@ -145,10 +145,10 @@ fn parse_column(text: &str) -> Result<(String, String), String> {
 /// number for each further case.
 fn add_case_number(path: &Path, case: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
     match case {
         0 => path.to_owned(),
-        _ => path.with_file_name(format!("{stem}-{}.{ending}", case + 1)),
+        _ => path.with_file_name(format!("{stem}-{}.{extension}", case + 1)),
     }
 }
 

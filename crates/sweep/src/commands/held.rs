@@ -118,8 +118,8 @@ fn describe_content(output: &Path) -> Result<String, Error> {
 fn format_options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
     let search_options = search.map(|search| search.to_string()).unwrap_or_default();
     let speed_options = format!(" --speed {speed}{search_options}");
-    let dwell_option = if search.is_some() { " --dwell" } else { "" };
-    let merge_options = format!("{dwell_option}{speed_options}");
+    let dwell_flag = if search.is_some() { " --dwell" } else { "" };
+    let merge_options = format!("{dwell_flag}{speed_options}");
     [speed_options, merge_options]
 }
 

@@ -33,7 +33,7 @@ pub struct InitArgs {
 /// # Errors
 /// Returns an error if the file exists or cannot be written.
 pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
-    let text = match (args.machine, args.short) {
+    let file_text = match (args.machine, args.short) {
         (true, true) => SHORT_MACHINE_FILE.to_owned(),
         // Scripts read the complete file, in which no number is left to the rules of assumption.
         (true, false) => config::machine_file(&Machine::paper(), &NumberSources::default()),
@@ -42,9 +42,9 @@ pub(crate) fn run(args: &InitArgs) -> Result<Exit, Error> {
     let default_name = if args.machine { "machine.toml" } else { "grid.toml" };
     let path = args.file.as_deref().unwrap_or(Path::new(default_name));
     if path == Path::new("-") {
-        return print(&text);
+        return print(&file_text);
     }
-    if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
+    if !atomic::create(atomic::parent(path), path, file_text.as_bytes())? {
         let reason = "a file is there already".to_owned();
         let help = "give another name, or remove that file first";
         return Err(FileError::Refused { path: path.to_owned(), reason, help }.into());

@@ -29,18 +29,18 @@ pub(crate) fn run(
     let write_error =
         |source| Error::File { action: "write manual pages to", path: args.folder.clone(), source };
     files::create_folder_without_leftovers(&args.folder)?;
-    let write =
+    let write_page =
         |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
     // Gives each command its full name, such as `sweep run`.
     program.build();
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
         let name = command.get_name();
-        write(
+        write_page(
             &format!("sweep-{name}.1"),
             &render_page(command, name, examples(name)).map_err(write_error)?,
         )?;
     }
-    write("sweep.1", &render_page(&program, "", examples("sweep")).map_err(write_error)?)?;
+    write_page("sweep.1", &render_page(&program, "", examples("sweep")).map_err(write_error)?)?;
     Ok(Exit::Done)
 }
 
@@ -49,14 +49,14 @@ fn render_page(command: &clap::Command, name: &str, examples: Examples) -> io::R
     let title = if name.is_empty() { "sweep".to_owned() } else { format!("sweep-{name}") };
     let man =
         Man::new(command.clone()).title(title).source(concat!("sweep ", env!("CARGO_PKG_VERSION")));
-    let mut text = Vec::new();
-    man.render_title(&mut text)?;
-    man.render_name_section(&mut text)?;
-    man.render_synopsis_section(&mut text)?;
-    man.render_description_section(&mut text)?;
-    man.render_options_section(&mut text)?;
+    let mut page_text = Vec::new();
+    man.render_title(&mut page_text)?;
+    man.render_name_section(&mut page_text)?;
+    man.render_synopsis_section(&mut page_text)?;
+    man.render_description_section(&mut page_text)?;
+    man.render_options_section(&mut page_text)?;
     if name.is_empty() {
-        man.render_subcommands_section(&mut text)?;
+        man.render_subcommands_section(&mut page_text)?;
     }
     let mut last_sections = Roff::new();
     last_sections.control("SH", ["EXIT STATUS"]);
@@ -70,23 +70,24 @@ fn render_page(command: &clap::Command, name: &str, examples: Examples) -> io::R
     for [line, purpose] in examples {
         last_sections.control("TP", []).text([bold(line)]).text([roman(purpose)]);
     }
-    last_sections.to_writer(&mut text)?;
-    Ok(text)
+    last_sections.to_writer(&mut page_text)?;
+    Ok(page_text)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::{command, find_examples};
+    use crate::commands::{command_line, find_examples};
 
     #[test]
     fn pages_have_their_name_examples_and_exit_codes() {
-        let mut program = command();
+        let mut program = command_line();
         program.build();
-        let run = program.find_subcommand("run").unwrap();
-        let text =
-            String::from_utf8(render_page(run, "run", find_examples("run")).unwrap()).unwrap();
-        for part in [
+        let run_command = program.find_subcommand("run").unwrap();
+        let page_text =
+            String::from_utf8(render_page(run_command, "run", find_examples("run")).unwrap())
+                .unwrap();
+        for expected_part in [
             ".TH sweep-run 1",
             "sweep run",
             ".SH EXAMPLES",
@@ -94,7 +95,7 @@ mod tests {
             ".SH \"EXIT STATUS\"",
             "75",
         ] {
-            assert!(text.contains(part), "no {part} in\n{text}");
+            assert!(page_text.contains(expected_part), "no {expected_part} in\n{page_text}");
         }
     }
 }

@@ -61,21 +61,25 @@ pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
     let Some(analysis) = analysis else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         output.finish(&analysis.table(&input).into_bytes(path)?)?;
-        let modes = analysis.modes.len();
-        tell(&format!("wrote {}: {modes} modes at {} speeds", path.display(), speeds_rpm.len()));
+        let mode_count = analysis.modes.len();
+        tell(&format!(
+            "wrote {}: {mode_count} modes at {} speeds",
+            path.display(),
+            speeds_rpm.len()
+        ));
     }
     if args.json {
         return show(&format!("{:#}\n", analysis.to_json(&input.name)));
     }
-    let mut text = mode_table(&speeds_rpm, &analysis.modes);
+    let mut text = format_mode_table(&speeds_rpm, &analysis.modes);
     text.push_str(&describe_differences(&analysis));
     if !analysis.friction_speeds.is_empty() {
-        let dampers = analysis.friction_speeds.iter().map(|(damper, speed)| {
+        let damper_texts = analysis.friction_speeds.iter().map(|(damper, speed)| {
             let speed = speed.as_f64().unwrap_or_default();
             format!("{} at {speed:.3} m/s", damper.replace('_', " "))
         });
-        let dampers: Vec<String> = dampers.collect();
-        text.push_str(&format!("friction is taken as in the run: {}\n", dampers.join(", ")));
+        let damper_list: Vec<String> = damper_texts.collect();
+        text.push_str(&format!("friction is taken as in the run: {}\n", damper_list.join(", ")));
     }
     show(&text)
 }
@@ -83,7 +87,7 @@ pub(crate) fn run(args: &ModesArgs) -> Result<Exit, Error> {
 /// Returns lines on the differences between the suspension's modes at a frozen angle of the drum
 /// and its exact motions. They are empty without exact motions.
 fn describe_differences(analysis: &ModeAnalysis) -> String {
-    let Some(exact) = &analysis.exact_modes else { return String::new() };
+    let Some(exact_modes) = &analysis.exact_modes else { return String::new() };
     let speeds_rpm = &analysis.speeds_rpm;
     let modes = &analysis.modes;
     let mut text =
@@ -92,20 +96,23 @@ fn describe_differences(analysis: &ModeAnalysis) -> String {
             .to_owned();
     for mode in 0..modes.len().min(COMPARED_MODES) {
         // The greatest difference (%) over all speeds, with its speed.
-        let greatest = |relative_difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
-            let modes_at_speeds = |k: usize| {
-                let difference =
-                    relative_difference(&modes[mode].modes_at_speeds[k], exact[k][mode].as_ref()?);
+        let greatest_difference = |relative_difference: fn(&ModeAtSpeed, &FloquetMode) -> f64| {
+            let difference_at_speed = |k: usize| {
+                let difference = relative_difference(
+                    &modes[mode].modes_at_speeds[k],
+                    exact_modes[k][mode].as_ref()?,
+                );
                 difference.is_finite().then_some((100.0 * difference, speeds_rpm[k]))
             };
-            let all = (0..speeds_rpm.len()).filter_map(modes_at_speeds);
-            all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+            let differences = (0..speeds_rpm.len()).filter_map(difference_at_speed);
+            differences.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
         };
-        let frequency =
-            greatest(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
-        let damping = greatest(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
+        let frequency_difference =
+            greatest_difference(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
+        let damping_difference =
+            greatest_difference(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
         if let (Some((frequency, frequency_rpm)), Some((damping, damping_rpm))) =
-            (frequency, damping)
+            (frequency_difference, damping_difference)
         {
             // Writing to a String cannot fail.
             let _ = writeln!(
@@ -122,33 +129,41 @@ fn describe_differences(analysis: &ModeAnalysis) -> String {
 
 /// Returns the printed table of modes: a line for each resonance of a mode, and one for a mode
 /// without any.
-fn mode_table(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> String {
-    let lowest_speed = format!("at {} rpm", decimal(speeds_rpm[0]));
+fn format_mode_table(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> String {
+    let lowest_speed_heading = format!("at {} rpm", decimal(speeds_rpm[0]));
     let mut text = format!(
         "mode   resonance   over a turn   damping   frequency   motion\n             \
-         rpm        +- rpm     ratio{lowest_speed:>12}\n"
+         rpm        +- rpm     ratio{lowest_speed_heading:>12}\n"
     );
     for (k, mode) in modes.iter().enumerate() {
-        let start_rpm = mode.modes_at_speeds[0].frequency_rpm;
-        let rows = mode.resonances.iter().map(|resonance| {
-            let swing_rpm =
+        let first_frequency_rpm = mode.modes_at_speeds[0].frequency_rpm;
+        let resonance_rows = mode.resonances.iter().map(|resonance| {
+            let half_variation_rpm =
                 0.5 * (resonance.mode.max_frequency_rpm - resonance.mode.min_frequency_rpm);
-            (format!("{:.2}", resonance.speed_rpm), format!("{swing_rpm:.3}"), &resonance.mode)
+            (
+                format!("{:.2}", resonance.speed_rpm),
+                format!("{half_variation_rpm:.3}"),
+                &resonance.mode,
+            )
         });
-        let none = ("none".to_owned(), "-".to_owned(), &mode.modes_at_speeds[0]);
-        let none = Some(none).filter(|_| mode.resonances.is_empty());
-        for (resonance, swing, at) in none.into_iter().chain(rows) {
-            let number = k + 1;
-            let damping = at.damping_ratio;
+        let row_without_resonance = ("none".to_owned(), "-".to_owned(), &mode.modes_at_speeds[0]);
+        let row_without_resonance =
+            Some(row_without_resonance).filter(|_| mode.resonances.is_empty());
+        for (resonance, swing, mode_at_speed) in
+            row_without_resonance.into_iter().chain(resonance_rows)
+        {
+            let mode_number = k + 1;
+            let damping = mode_at_speed.damping_ratio;
             let motion = mode.motion.to_string();
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{number:>4}{resonance:>12}{swing:>14}{damping:>10.4}{start_rpm:>12.2}   {motion}"
+                "{mode_number:>4}{resonance:>12}{swing:>14}{damping:>10.4}\
+                 {first_frequency_rpm:>12.2}   {motion}"
             );
         }
     }
-    if let Some((variation, mode, speed)) = greatest_variation(speeds_rpm, modes) {
+    if let Some((variation, mode, speed)) = find_greatest_variation(speeds_rpm, modes) {
         let percent = 100.0 * variation;
         let _ = writeln!(
             text,
@@ -162,9 +177,12 @@ fn mode_table(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> String {
 
 /// Returns the greatest variation of a resonant mode's frequency over a turn (half the distance
 /// from least to greatest as a share of the mean), the mode's number, and the speed (rpm).
-fn greatest_variation(speeds_rpm: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
-    let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
-    resonant
+fn find_greatest_variation(
+    speeds_rpm: &[f64],
+    modes: &[ModeOverSpeed],
+) -> Option<(f64, usize, f64)> {
+    let resonant_modes = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
+    resonant_modes
         .flat_map(|(k, mode)| {
             mode.modes_at_speeds.iter().zip(speeds_rpm).map(move |(at, &speed)| {
                 (

@@ -21,7 +21,7 @@ pub struct WasherPlotArgs {
     pub channels: Vec<String>,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
-    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = parse_speed)]
+    #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = parse_positive_speed)]
     #[arg(allow_negative_numbers = true)]
     pub resonances: Vec<f64>,
 
@@ -58,7 +58,8 @@ pub struct WasherPlotArgs {
 /// # Errors
 /// Returns the errors of the engine's command, and an error for a map that no page can compute.
 pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
-    let live = args.live.then(|| build_live_part(&args.plot.file, &args.sliders)).transpose()?;
+    let live_part =
+        args.live.then(|| build_live_part(&args.plot.file, &args.sliders)).transpose()?;
     let figures = WasherFigures {
         view: args.plot.view,
         channels: args.channels.clone(),
@@ -66,7 +67,7 @@ pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
         modes: args.modes.clone(),
         stability: args.stability.clone(),
         against: args.against.clone(),
-        live,
+        live: live_part,
     };
     let options = PlotOptions {
         view: args.plot.view.and_then(FigureView::design_view),
@@ -76,7 +77,7 @@ pub(crate) fn run(args: &WasherPlotArgs) -> Result<Exit, Error> {
     plot::draw(&args.plot, options, &figures)
 }
 
-fn parse_speed(text: &str) -> Result<f64, String> {
+fn parse_positive_speed(text: &str) -> Result<f64, String> {
     let speed = parse_finite(text)?;
     if speed > 0.0 { Ok(speed) } else { Err("expected a speed above 0 rpm".to_owned()) }
 }
@@ -92,14 +93,14 @@ mod tests {
         plot: WasherPlotArgs,
     }
 
-    fn parse(line: &str) -> Result<WasherPlotArgs, String> {
+    fn parse_line(line: &str) -> Result<WasherPlotArgs, String> {
         let words = std::iter::once("plot").chain(line.split(' '));
         WasherCli::try_parse_from(words).map(|cli| cli.plot).map_err(|error| error.to_string())
     }
 
     #[test]
     fn options_are_read_as_documented() {
-        let args = parse(
+        let args = parse_line(
             "m.parquet --quantity min_gap_linear_m --at spin_peak_rpm=350 --resonances 99.9,147.6 \
              --channel a --channel b",
         );
@@ -118,7 +119,7 @@ mod tests {
             ("m.parquet --resonances -3", "expected a speed above 0 rpm"),
             ("m.parquet --resonances 0", "expected a speed above 0 rpm"),
         ] {
-            let message = parse(line).unwrap_err();
+            let message = parse_line(line).unwrap_err();
             assert!(message.contains(expected), "{line}: {message}");
         }
     }

@@ -20,11 +20,11 @@ fn summary_lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Erro
     })
 }
 
-/// Whether a column belongs to a metric.
+/// Returns whether a column belongs to a metric.
 fn is_metric_column(column: &str) -> bool {
     // The name of a column of one stop or foot has a number after the first word.
-    let words = column.split('_').filter(|word| word.parse::<u32>().is_err());
-    let name = words.collect::<Vec<_>>().join("_");
+    let words_without_numbers = column.split('_').filter(|word| word.parse::<u32>().is_err());
+    let name = words_without_numbers.collect::<Vec<_>>().join("_");
     Metric::ALL.iter().any(|metric| name.starts_with(metric.name()))
 }
 
@@ -34,8 +34,10 @@ mod tests {
 
     #[test]
     fn columns_of_metrics_are_told_from_others() {
-        let metrics = ["cabinet_force_linear_n", "static_sag_m", "stop_2_force_nonlinear_n"];
-        for name in [metrics.as_slice(), &["foot_load_linear_n", "growth_mode_1_name"]].concat() {
+        let metric_columns = ["cabinet_force_linear_n", "static_sag_m", "stop_2_force_nonlinear_n"];
+        for name in
+            [metric_columns.as_slice(), &["foot_load_linear_n", "growth_mode_1_name"]].concat()
+        {
             assert!(is_metric_column(name), "{name}");
         }
         for name in ["ratio_max", "stop_2_clearance_m", "min_gap_linear_m", "status"] {

@@ -93,9 +93,9 @@ fn check_names(args: &SlurmArgs, folder: &Path, program: &Path) -> Result<(), Er
         ("the path of this program", Some(program)),
     ];
     let paths = paths.into_iter().filter_map(|(name, path)| Some((name, path?.as_os_str())));
-    let sets = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
-    let at = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
-    for (option, name) in paths.chain(sets).chain(at) {
+    let set_texts = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
+    let at_texts = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
+    for (option, name) in paths.chain(set_texts).chain(at_texts) {
         if name.to_str().is_none_or(|name| parse_word(name).is_err()) {
             let expected = "a name in UTF-8 without control characters, as a script needs";
             return Err(Error::option(option, format!("{name:?}"), expected));
@@ -107,18 +107,18 @@ fn check_names(args: &SlurmArgs, folder: &Path, program: &Path) -> Result<(), Er
 /// Returns the script, which submits the array and the merge that waits for it.
 fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -> String {
     let output = args.target.output(plan);
-    let results = match output.parent() {
+    let results_folder = match output.parent() {
         Some(parent) if parent != Path::new("") => parent.to_path_buf(),
         _ => PathBuf::from("."),
     };
     // sbatch reads % as the start of a field.
-    let log_pattern = |field: &str| {
-        let stem = results.join(&plan.name).display().to_string().replace('%', "%%");
-        quoted_pattern(&format!("{stem}.slurm-{field}.log"))
+    let log_name = |field: &str| {
+        let stem = results_folder.join(&plan.name).display().to_string().replace('%', "%%");
+        quote_pattern(&format!("{stem}.slurm-{field}.log"))
     };
     // `command` begins with the program's bare name; on a node only its path is sure to be found.
     let program = quote_for_shell(&program.display().to_string());
-    let command = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
+    let command_text = |verb: &str| args.target.command(verb).replacen("sweep", &program, 1);
     let SlurmArgs { time, partition, account, mem, .. } = args;
     let named_options =
         [("time", time), ("partition", partition), ("account", account), ("mem", mem)];
@@ -127,26 +127,30 @@ fn format_script(args: &SlurmArgs, plan: &Plan, folder: &Path, program: &Path) -
     let named_options =
         named_options.map(|(option, value)| format!(" --{option}={}", quote_for_shell(value)));
     let further_options = args.sbatch.iter().map(|option| format!(" {}", quote_for_shell(option)));
-    let common: String = named_options.chain(further_options).collect();
+    let common_options: String = named_options.chain(further_options).collect();
     format!(
         include_str!("slurm.sh"),
         name = quote_for_shell(&plan.name),
         folder = quote_for_shell(&folder.display().to_string()),
-        results = quote_for_shell(&results.display().to_string()),
+        results = quote_for_shell(&results_folder.display().to_string()),
         shards = args.shards,
         cpus = args.cpus_per_task,
-        array_log = log_pattern("%A_%a"),
-        merge_log = log_pattern("merge-%j"),
-        run = command("run"),
-        merge = command("merge"),
-        common = common,
+        array_log = log_name("%A_%a"),
+        merge_log = log_name("merge-%j"),
+        run = command_text("run"),
+        merge = command_text("merge"),
+        common = common_options,
     )
 }
 
 /// Returns a pattern of file names, quoted for a shell if another character than `%` needs it.
-fn quoted_pattern(pattern: &str) -> String {
-    let rest = pattern.replace('%', "");
-    if quote_for_shell(&rest) == rest { pattern.to_owned() } else { quote_for_shell(pattern) }
+fn quote_pattern(pattern: &str) -> String {
+    let pattern_without_fields = pattern.replace('%', "");
+    if quote_for_shell(&pattern_without_fields) == pattern_without_fields {
+        pattern.to_owned()
+    } else {
+        quote_for_shell(pattern)
+    }
 }
 
 #[cfg(test)]
@@ -163,28 +167,28 @@ mod tests {
         args: SlurmArgs,
     }
 
-    fn parse(words: &[&str]) -> Result<SlurmArgs, clap::Error> {
+    fn parse_words(words: &[&str]) -> Result<SlurmArgs, clap::Error> {
         SlurmCli::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
     }
 
     /// Runs a script, with a program in place of sbatch that records its calls. Returns the lines
     /// of all arguments and batch scripts, and the script's output.
-    fn run_script(script: &str, arguments: &[&str], home: &Path) -> (Vec<String>, String) {
+    fn run_script(script: &str, arguments: &[&str], folder: &Path) -> (Vec<String>, String) {
         use std::io::Write;
-        let bin = home.join("bin");
-        std::fs::create_dir_all(&bin).unwrap();
-        let calls = home.join("calls");
+        let bin_folder = folder.join("bin");
+        std::fs::create_dir_all(&bin_folder).unwrap();
+        let calls_path = folder.join("calls");
         let fake_sbatch = format!(
             "#!/bin/sh\nprintf '%s\\n' \"$@\" >> {0}\ncat >> {0}\necho '17;cluster'\n",
-            calls.display()
+            calls_path.display()
         );
-        std::fs::write(bin.join("sbatch"), fake_sbatch).unwrap();
+        std::fs::write(bin_folder.join("sbatch"), fake_sbatch).unwrap();
         std::fs::set_permissions(
-            bin.join("sbatch"),
+            bin_folder.join("sbatch"),
             std::os::unix::fs::PermissionsExt::from_mode(0o755),
         )
         .unwrap();
-        let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
+        let path = format!("{}:{}", bin_folder.display(), std::env::var("PATH").unwrap());
         let mut shell = Command::new("sh")
             .args([&["-s", "--"], arguments].concat())
             .env("PATH", path)
@@ -195,20 +199,23 @@ mod tests {
         shell.stdin.take().unwrap().write_all(script.as_bytes()).unwrap();
         let output = shell.wait_with_output().unwrap();
         assert!(output.status.success());
-        let calls = std::fs::read_to_string(calls).unwrap();
-        (calls.lines().map(str::to_owned).collect(), String::from_utf8(output.stdout).unwrap())
+        let recorded_calls = std::fs::read_to_string(calls_path).unwrap();
+        (
+            recorded_calls.lines().map(str::to_owned).collect(),
+            String::from_utf8(output.stdout).unwrap(),
+        )
     }
 
     #[test]
     fn a_script_submits_the_right_commands_even_with_names_that_need_quotes() {
         let home = tempfile::tempdir().unwrap();
-        let grid = home.path().join("it's a grid.toml");
-        let text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = \
+        let grid_path = home.path().join("it's a grid.toml");
+        let grid_text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = \
                     350\nramp_s = 50\n[time]\nend_s = 50\n";
-        std::fs::write(&grid, text).unwrap();
-        let grid = grid.to_str().unwrap();
-        let args = parse(&[
-            grid,
+        std::fs::write(&grid_path, grid_text).unwrap();
+        let grid_name = grid_path.to_str().unwrap();
+        let args = parse_words(&[
+            grid_name,
             "--shards",
             "8",
             "--set",
@@ -227,13 +234,13 @@ mod tests {
         let script = format_script(&args, &plan, home.path(), Path::new("/opt/my sweep"));
         let (calls, output) = run_script(&script, &["--array=3,7"], home.path());
         assert_eq!(output, "array 17, merge 17\n");
-        let position = |expected: &str| {
+        let position_of = |expected: &str| {
             calls
                 .iter()
                 .position(|line| line == expected)
                 .unwrap_or_else(|| panic!("no {expected} in\n{}", calls.join("\n")))
         };
-        assert!(position("--array=1-8") < position("--array=3,7"), "the later one counts");
+        assert!(position_of("--array=1-8") < position_of("--array=3,7"), "the later one counts");
         for expected in [
             "--job-name=half.of-it",
             "--cpus-per-task=4",
@@ -242,16 +249,16 @@ mod tests {
             "--mem=1G",
             "--comment=two words",
         ] {
-            position(expected);
+            position_of(expected);
         }
-        position("--output=results/half.of-it.slurm-%A_%a.log");
-        position("--dependency=afterany:17");
-        let grid = grid.replace('\'', r"'\''");
-        position(&format!(
-            "exec '/opt/my sweep' run '{grid}' --set tub_mass_kg=20 \
+        position_of("--output=results/half.of-it.slurm-%A_%a.log");
+        position_of("--dependency=afterany:17");
+        let quoted_grid = grid_name.replace('\'', r"'\''");
+        position_of(&format!(
+            "exec '/opt/my sweep' run '{quoted_grid}' --set tub_mass_kg=20 \
              --shard \"$SLURM_ARRAY_TASK_ID/8\""
         ));
-        position(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
+        position_of(&format!("exec '/opt/my sweep' merge '{quoted_grid}' --set tub_mass_kg=20"));
         assert!(home.path().join("results").is_dir(), "Slurm creates no folder for its logs");
     }
 
@@ -259,16 +266,16 @@ mod tests {
     fn names_with_line_breaks_are_refused() {
         use std::os::unix::ffi::OsStrExt;
         let is_accepted = |words: &[&str], folder: &[u8], program: &str| {
-            let args = parse(&[words, &["--shards", "2"]].concat()).unwrap();
+            let args = parse_words(&[words, &["--shards", "2"]].concat()).unwrap();
             check_names(&args, Path::new(OsStr::from_bytes(folder)), Path::new(program)).is_ok()
         };
         assert!(is_accepted(&["it's $(a) `grid`.toml", "--out", "ü x.parquet"], b"/a b", "/sweep"));
-        let out = "x\nEND\ntouch /tmp/out\n.toml";
-        assert!(!is_accepted(&[out], b"/", "/sweep"));
-        assert!(!is_accepted(&["g.toml", "--out", out], b"/", "/sweep"));
-        assert!(!is_accepted(&["g.toml", "--set", out], b"/", "/sweep"));
-        assert!(!is_accepted(&["g.toml"], out.as_bytes(), "/sweep"));
-        assert!(!is_accepted(&["g.toml"], b"/", out));
+        let broken_name = "x\nEND\ntouch /tmp/out\n.toml";
+        assert!(!is_accepted(&[broken_name], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml", "--out", broken_name], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml", "--set", broken_name], b"/", "/sweep"));
+        assert!(!is_accepted(&["g.toml"], broken_name.as_bytes(), "/sweep"));
+        assert!(!is_accepted(&["g.toml"], b"/", broken_name));
         assert!(!is_accepted(&["g.toml"], b"/\xff", "/sweep"), "a lossy name is another one");
         assert!(!is_accepted(&["g.toml", "--out", "a\r.parquet"], b"/", "/sweep"));
     }
@@ -282,7 +289,7 @@ mod tests {
             &["g.toml", "--shards", "8", "--cpus-per-task", "0"],
             &["g.toml", "--shards", "8", "--time", "1\n2"],
         ] {
-            assert!(parse(words).is_err(), "{words:?}");
+            assert!(parse_words(words).is_err(), "{words:?}");
         }
     }
 }

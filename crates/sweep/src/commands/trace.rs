@@ -86,18 +86,19 @@ pub(crate) fn run(args: &TraceArgs) -> Result<Exit, Error> {
     let every_s = check_spacing((!args.turns).then_some(args.every), &plan)?;
     let TraceArgs { rates, states, forces, angle, model: models, .. } = *args;
     let extras = TraceExtras { rates, states, forces, angle };
-    let start = start_from(&args.start);
+    let start_state = start_from(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let settings = TraceSettings { every_s, models, start, extras, capped: None };
+    let settings = TraceSettings { every_s, models, start: start_state, extras, capped: None };
     // A signal ends the process, because there are no partial results to keep.
     let trace_table =
         trace_in_pool(&plan, parameters, &settings, Cancel::Never).map_err(Error::model)?;
     let TraceTable { table, instants, failures, method } = trace_table;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
-    let points = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
+    let points_text =
+        if args.all { format!(" of {} points", plan.points()) } else { String::new() };
     let out = args.out.display();
-    tell(&format!("wrote {out}: {instants} instants{points} from 0 to {} s", plan.end_s));
+    tell(&format!("wrote {out}: {instants} instants{points_text} from 0 to {} s", plan.end_s));
     // A row is comparable only with a trace of both models that start at equilibrium.
     if args.start.is_empty() && !args.all && models == Models::Both {
         tell(summarise_row(&plan, &point_values, method)?.trim_end());
@@ -113,16 +114,19 @@ fn choose_point(args: &TraceArgs) -> Result<Vec<String>, Error> {
     let plan: Plan = args.grid.load()?;
     let mut point = args.point.unwrap_or_default();
     if let Some(column) = &args.worst {
-        let worse;
-        (point, worse) = find_worst(args, &plan, column)?;
-        tell(&format!("point {point} is where {column} is {}", worse.worst_value_word()));
+        let worse_direction;
+        (point, worse_direction) = find_worst(args, &plan, column)?;
+        tell(&format!("point {point} is where {column} is {}", worse_direction.worst_value_word()));
     }
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
-    let names = plan.axes.iter().map(|axis| &*axis.parameter.name);
+    let axis_names = plan.axes.iter().map(|axis| &*axis.parameter.name);
     // `Display` writes the shortest decimals that parse to the same values.
-    Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
+    Ok(axis_names
+        .zip(plan.axis_values(point))
+        .map(|(name, value)| format!("{name}={value}"))
+        .collect())
 }
 
 /// Returns the point of the grid's result at which a column is worst, and the bad direction of that
@@ -137,22 +141,23 @@ fn find_worst(args: &TraceArgs, plan: &Plan, column: &str) -> Result<(u64, Worse
         let expected = format!("a result at {} (--result); {run_command} makes it", path.display());
         return Err(refuse(expected));
     }
-    let file = ResultTable::open(&path)?;
+    let map_table = ResultTable::open(&path)?;
     let hash = Job::new(plan).hash().to_hex().to_string();
-    if file.file().value(key::PLAN_HASH) != Some(hash.as_str()) {
+    if map_table.file().value(key::PLAN_HASH) != Some(hash.as_str()) {
         let expected = format!("a result of this very grid, which {} is not", path.display());
         return Err(refuse(expected));
     }
-    let worse = file.column(column).map_or(Some(Worse::Greater), |info| info.metadata.worse);
-    let worse = worse.ok_or_else(|| {
+    let worse_or_none =
+        map_table.column(column).map_or(Some(Worse::Greater), |info| info.metadata.worse);
+    let worse_direction = worse_or_none.ok_or_else(|| {
         refuse(format!(
             "a column that is bad one way, which {column} is not: --point takes the number of any \
              row"
         ))
     })?;
-    let rows = top_rows(&file, &["point", column], None, Some((column, worse)), 1)?;
+    let rows = top_rows(&map_table, &["point", column], None, Some((column, worse_direction)), 1)?;
     match rows.first().map(Vec::as_slice) {
-        Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse)),
+        Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse_direction)),
         _ => Err(refuse(format!("a column that has values in {}", path.display()))),
     }
 }
@@ -173,51 +178,57 @@ fn summarise_row(
     let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
     let verdict = row.verdict();
-    let format_column =
+    let column_text =
         |column: &str| row.number(column).map_or_else(|| "none".to_owned(), format_number);
-    let channel_line = |channel: &Channel| {
+    let channel_cells = |channel: &Channel| {
         let name = channel.name();
-        let numbers = ["nonlinear", "linear", "ratio"]
-            .map(|prefix| format_column(&format!("{prefix}_{name}")));
+        let numbers =
+            ["nonlinear", "linear", "ratio"].map(|prefix| column_text(&format!("{prefix}_{name}")));
         [vec![name.to_owned(), channel.unit().to_owned()], numbers.to_vec()].concat()
     };
-    let lines: Vec<Vec<String>> = channels.iter().map(channel_line).collect();
+    let channel_rows: Vec<Vec<String>> = channels.iter().map(channel_cells).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
-    let window = format_range(plan.window_s, format_number);
-    let amplitude = plan.model.measures.criterion.amplitude_description();
-    let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    let mut text =
-        format!("{amplitude}, {window} s{point}:\n{}", format_table(&headings, &lines, ""));
+    let window_text = format_range(plan.window_s, format_number);
+    let amplitude_text = plan.model.measures.criterion.amplitude_description();
+    let point_text = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+    let mut text = format!(
+        "{amplitude_text}, {window_text} s{point_text}:\n{}",
+        format_table(&headings, &channel_rows, "")
+    );
     // The decisive ratio is one that is beyond its limit, or else the greatest.
     let least_below_limit =
         limits.lower.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
-    let decisive = match (verdict.greatest, least_below_limit) {
+    let decisive_ratio = match (verdict.greatest, least_below_limit) {
         (Some((_, ratio)), Some((limit, least))) if ratio < limits.upper => {
             Some((least, "least", limit))
         }
         (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.upper)),
     };
-    let verdict_text = match (verdict.reliable, decisive) {
+    let verdict_text = match (verdict.reliable, decisive_ratio) {
         (Some(reliable), Some(((channel, ratio), extreme_name, limit))) => {
-            let word = if reliable { "reliable" } else { "not reliable" };
-            let channel = channels[channel].name();
-            let ratio = format_number(ratio);
-            let limit = format_number(limit);
-            format!("{word}: the {extreme_name} ratio is {ratio} ({channel}), the limit {limit}")
+            let verdict_word = if reliable { "reliable" } else { "not reliable" };
+            let channel_name = channels[channel].name();
+            let ratio_text = format_number(ratio);
+            let limit_text = format_number(limit);
+            format!(
+                "{verdict_word}: the {extreme_name} ratio is {ratio_text} ({channel_name}), the \
+                 limit {limit_text}"
+            )
         }
         _ => "undefined: no ratio is defined".to_owned(),
     };
     text.line("verdict", &verdict_text);
     if let Some(trace_method) = trace_method.filter(|_| direct_method(&plan.integrator).is_none()) {
-        let method = row.name("method").unwrap_or_default();
+        let row_method = row.name("method").unwrap_or_default();
         let trace_name = trace_method.name();
-        let methods = format!("{method}, as in the point's row of a map; the file: {trace_name}");
-        text.line("method", methods);
+        let methods_text =
+            format!("{row_method}, as in the point's row of a map; the file: {trace_name}");
+        text.line("method", methods_text);
     }
     if row.flag("sensitive") == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
-    let least_gaps = MODEL_NAMES.map(|model| format_column(&format!("min_gap_{model}_m")));
+    let least_gaps = MODEL_NAMES.map(|model| column_text(&format!("min_gap_{model}_m")));
     let gap_text =
         format!("{} m nonlinear, {} m linear, over the whole run", least_gaps[0], least_gaps[1]);
     text.line("least gap", &gap_text);

@@ -35,7 +35,7 @@ pub(super) fn walk_machine(
 ) {
     let key = Key::new("machine", "\"paper\", or a machine file relative to this file");
     if let (Some(root), Some(input)) = (keys.section(), input) {
-        *machine = grid_machine(input, root);
+        *machine = read_grid_machine(input, root);
     }
     keys.describe(key, |is_schema| match is_schema {
         true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
@@ -44,7 +44,7 @@ pub(super) fn walk_machine(
 }
 
 /// Returns the machine that a grid names, or the one that was given with the input.
-fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
+fn read_grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
     let report = root.report;
     if let Some(text) = &input.model_file {
         return parse_machine(text, "its machine", report);
@@ -88,39 +88,46 @@ pub(super) fn walk_stability(
     speeds: &mut Option<SpeedList>,
     keys: &mut Keys<'_>,
 ) {
-    let held_metric = metrics.iter().find(|metric| metric.is_at_held_speeds());
-    let needs_speeds = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
+    let metric_at_held_speeds = metrics.iter().find(|metric| metric.is_at_held_speeds());
+    let missing_speeds_title =
+        |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
     if let (KeyWalk::Set(_), Field::Present(location)) = (&keys.walk, metrics_field) {
-        if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
+        if let (Some(metric), None, Some(report)) = (metric_at_held_speeds, &speeds, keys.report())
+        {
             let expected = "expected a grid file with this metric and a section [stability]";
-            report.refuse::<()>(&location.location, needs_speeds(metric), expected);
+            report.refuse::<()>(&location.location, missing_speeds_title(metric), expected);
         }
-        speeds.take_if(|_| held_metric.is_none());
+        speeds.take_if(|_| metric_at_held_speeds.is_none());
     }
     let description = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \"60:400:1\": \
                        those of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
-    let mut text = speeds.as_ref().map(ToString::to_string);
-    let field = keys.walk_table(Key::new("stability", ""), |keys| {
-        let read = |section: &Section<'_>, key| {
-            section.text_or_number(key).map(|found| found.value.into())
+    let mut speeds_text = speeds.as_ref().map(ToString::to_string);
+    let section_field = keys.walk_table(Key::new("stability", ""), |keys| {
+        let read_speeds = |section: &Section<'_>, key| {
+            section.text_or_number(key).map(|speeds_value| speeds_value.value.into())
         };
-        let kind = Form::Custom(&read, json!({ "type": ["string", "number"] }));
-        let field =
-            keys.walk_key(Key::new("speed_rpm", description).required(expected), &kind, &mut text);
-        let (Field::Present(found), Some(text), Some(report)) = (field, text, keys.report()) else {
+        let value_form = Form::Custom(&read_speeds, json!({ "type": ["string", "number"] }));
+        let key_field = keys.walk_key(
+            Key::new("speed_rpm", description).required(expected),
+            &value_form,
+            &mut speeds_text,
+        );
+        let (Field::Present(key_location), Some(text), Some(report)) =
+            (key_field, speeds_text, keys.report())
+        else {
             return;
         };
         match text.parse() {
-            Ok(list) => *speeds = Some(list),
+            Ok(speed_list) => *speeds = Some(speed_list),
             Err(expected) => {
                 let title = format!("`speed_rpm` = \"{text}\" is no list of speeds");
-                report.refuse::<()>(&found.location, title, expected);
+                report.refuse::<()>(&key_location.location, title, expected);
             }
         }
     });
     let Some(root) = keys.section() else { return };
-    match (field, held_metric) {
+    match (section_field, metric_at_held_speeds) {
         (Field::Present(section), None) => {
             let title =
                 "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
@@ -131,8 +138,8 @@ pub(super) fn walk_stability(
         (Field::Absent, Some(metric)) => {
             let expected =
                 "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
-            let refusal =
-                Diagnostic::new(needs_speeds(metric)).at_location(root.location(), expected);
+            let refusal = Diagnostic::new(missing_speeds_title(metric))
+                .at_location(root.location(), expected);
             root.report.push_missing(refusal);
         }
         _ => {}
@@ -140,8 +147,8 @@ pub(super) fn walk_stability(
 }
 
 /// Returns the part that a metric needs and the machine lacks, with the expected sections.
-pub(crate) fn missing_part(metric: Metric, machine: &Machine) -> Option<&'static str> {
-    let (has_part, part) = match metric.properties().part? {
+pub(crate) fn find_missing_part(metric: Metric, machine: &Machine) -> Option<&'static str> {
+    let (has_part, part_name) = match metric.properties().part? {
         PartKind::Stop => {
             (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
         }
@@ -153,16 +160,16 @@ pub(crate) fn missing_part(metric: Metric, machine: &Machine) -> Option<&'static
             (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
         }
     };
-    (!has_part).then_some(part)
+    (!has_part).then_some(part_name)
 }
 
 /// Refuses metrics of parts that the machine lacks.
 pub(crate) fn check_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>) {
     for metric in metrics {
-        if let Some(part) = missing_part(*metric, machine) {
+        if let Some(missing_part) = find_missing_part(*metric, machine) {
             let title = format!("the metric `{}` needs a machine with more parts", metric.name());
             let refusal = Diagnostic::new(title)
-                .at_location(root.location(), format!("the machine has no {part}"));
+                .at_location(root.location(), format!("the machine has no {missing_part}"));
             root.report.push(refusal);
         }
     }

@@ -23,24 +23,27 @@ const MAX_NOTES: usize = 8;
 pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let Washer { machine, spin, .. } = &plan.model;
-    let written = draft.report.parameter_sources();
+    let user_parameters = draft.report.parameter_sources();
     let mut notes = Vec::new();
     for parameter in MachineParameter::all(machine, spin) {
-        let is_written_once =
-            written.contains_key(parameter.name()) && !parameter.target().has_several_numbers();
-        if let Some(value) = parameter.get(machine, spin).filter(|_| is_written_once) {
+        let is_single_user_number = user_parameters.contains_key(parameter.name())
+            && !parameter.target().has_several_numbers();
+        if let Some(value) = parameter.get(machine, spin).filter(|_| is_single_user_number) {
             notes.extend(find_unusual_note(&parameter, value));
         }
     }
     for axis in &plan.axes {
-        let ends = axis.values.extremes();
+        let axis_ends = axis.values.extremes();
         notes.extend(
-            ends.into_iter().find_map(|end| find_unusual_note(&axis.parameter.handle, end)),
+            axis_ends.into_iter().find_map(|end| find_unusual_note(&axis.parameter.handle, end)),
         );
     }
     let unbalance_kg = machine.unbalance.mass_kg;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
-    if notes.is_empty() && written.contains_key("unbalance_mass_kg") && unbalance_kg > moving_kg {
+    if notes.is_empty()
+        && user_parameters.contains_key("unbalance_mass_kg")
+        && unbalance_kg > moving_kg
+    {
         notes.push(format!(
             "unbalance_mass_kg = {} kg is more than tub, shaft and drum together, {} kg",
             decimal(unbalance_kg),
@@ -56,23 +59,26 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
 
 /// Returns a note if a parameter's value is unusual.
 fn find_unusual_note(parameter: &MachineParameter, value: f64) -> Option<String> {
-    let usual = find_usual_range(parameter)?;
-    let [least, greatest] = usual.bounds;
+    let usual_range = find_usual_range(parameter)?;
+    let [least, greatest] = usual_range.bounds;
     let is_usual = |value: f64| value == 0.0 || (least..=greatest).contains(&value.abs());
     if is_usual(value) {
         return None;
     }
     let unit = parameter.unit();
     let name = parameter.name();
-    let shown = decimal(value);
-    let range = format!("machines have {} to {}", decimal(least), decimal(greatest));
+    let value_text = decimal(value);
+    let range_text = format!("machines have {} to {}", decimal(least), decimal(greatest));
     // In the unit that was meant the number is usual, such as 10 mm for a clearance of "10" m.
-    let intended_unit = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
-    let conversion = intended_unit.map(|(other, size)| {
-        format!(": {shown} {other} would be {} {unit}", decimal(round_to_6_digits(value * size)))
+    let intended_unit = usual_range.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
+    let conversion_text = intended_unit.map(|(other, size)| {
+        format!(
+            ": {value_text} {other} would be {} {unit}",
+            decimal(round_to_6_digits(value * size))
+        )
     });
-    let conversion = conversion.unwrap_or_default();
-    Some(format!("unusual: {name} = {shown} {unit}, {range}{conversion}"))
+    let conversion_text = conversion_text.unwrap_or_default();
+    Some(format!("unusual: {name} = {value_text} {unit}, {range_text}{conversion_text}"))
 }
 
 /// Returns a number of at most six digits, for a message.

@@ -42,9 +42,9 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
         || *criterion != Criterion::default()
     {
         let key = Key::new("criterion", description).settable();
-        let mut word = criterion.name().to_owned();
-        keys.walk_key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
-        *criterion = Criterion::named(&word).unwrap_or_default();
+        let mut criterion_name = criterion.name().to_owned();
+        keys.walk_key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut criterion_name);
+        *criterion = Criterion::named(&criterion_name).unwrap_or_default();
     }
 }
 

@@ -18,7 +18,7 @@ use cycle::JointKind;
 pub(super) const MAX_TABLE_ROWS: usize = 20_000;
 
 /// The spin that replaces an invalid one, so that axes of its parameters are still checked.
-pub(crate) const PLACEHOLDER: Spin =
+pub(crate) const PLACEHOLDER_SPIN: Spin =
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
 
 /// Returns the description of a profile that has a peak and a ramp.
@@ -64,20 +64,21 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
             default_index: is_default.then_some(table_index + 1),
             settable_count: table_index,
         };
-        let current = match spin {
+        let current_variant = match spin {
             Spin::Ramped { profile, .. } => *profile as usize,
             Spin::Table { .. } => table_index,
         };
         let key = Key::new("profile", "").settable();
-        let chosen_variant = keys.walk_variants(key, &variants, Some(current), |keys, k| {
-            match Profile::ALL.get(k) {
+        let chosen_variant =
+            keys.walk_variants(key, &variants, Some(current_variant), |keys, k| match Profile::ALL
+                .get(k)
+            {
                 Some(&profile) => walk_ramp(profile, spin, keys),
                 None if k == table_index => walk_table(spin, keys),
                 None => walk_file(spin, path, keys),
-            }
-        });
+            });
         if chosen_variant.is_none() && keys.section().is_some() {
-            *spin = PLACEHOLDER;
+            *spin = PLACEHOLDER_SPIN;
         }
     });
 }
@@ -93,16 +94,16 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         Key::new(FILE_PROFILE, description).required("a CSV or Parquet file of times and speeds");
     let file_field = keys.walk_key(key, &Form::Text, &mut file_name);
     let description = "straight lines between the rows, or monotone cubics";
-    let names = JointKind::ALL.map(|(_, name)| name);
-    let mut word = names[0].to_owned();
-    keys.walk_key(Key::new("joints", description), &Form::Word(&names), &mut word);
+    let joint_names = JointKind::ALL.map(|(_, name)| name);
+    let mut joint_name = joint_names[0].to_owned();
+    keys.walk_key(Key::new("joints", description), &Form::Word(&joint_names), &mut joint_name);
     let (Field::Present(location), Some(report)) = (file_field, keys.report()) else {
         if keys.section().is_some() {
-            *spin = PLACEHOLDER;
+            *spin = PLACEHOLDER_SPIN;
         }
         return;
     };
-    let joints = JointKind::ALL.into_iter().find(|(_, name)| *name == word);
+    let joints = JointKind::ALL.into_iter().find(|(_, name)| *name == joint_name);
     let joints = joints.map_or(JointKind::Straight, |(joints, _)| joints);
     *spin = match cycle::read(&resolve_beside(path, &file_name), joints, &location.location, report)
     {
@@ -115,7 +116,7 @@ fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
             }
             Spin::Table { time_s, speed_rpm }
         }
-        None => PLACEHOLDER,
+        None => PLACEHOLDER_SPIN,
     };
 }
 
@@ -134,10 +135,15 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
         ("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm", &mut *peak_rpm),
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
-        if let Ok(parameter) = MachineParameter::find(parameter, &Machine::paper(), &PLACEHOLDER) {
+        if let Ok(parameter) =
+            MachineParameter::find(parameter, &Machine::paper(), &PLACEHOLDER_SPIN)
+        {
             let range = parameter.range();
-            let description =
-                describe_parameter(&engine_parameter(parameter, &Machine::paper(), &PLACEHOLDER));
+            let description = describe_parameter(&engine_parameter(
+                parameter,
+                &Machine::paper(),
+                &PLACEHOLDER_SPIN,
+            ));
             let key = Key::new(key, &description).required(expected);
             let field = keys.walk_key(key, &Form::Number(range), value);
             is_valid &= matches!(field, Field::Present(_)) || keys.section().is_none();
@@ -145,7 +151,7 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     }
     *spin_profile = profile;
     if !is_valid {
-        *spin = PLACEHOLDER;
+        *spin = PLACEHOLDER_SPIN;
     }
 }
 
@@ -153,11 +159,11 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
 fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.mark_misplaced(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
     keys.mark_misplaced(&["file", "joints"], NEEDS_FILE_PROFILE);
-    let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, PLACEHOLDER) {
+    let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, PLACEHOLDER_SPIN) {
         Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
         _ => Default::default(),
     };
-    let times = NumberArray {
+    let times_form = NumberArray {
         help: Some("leave out rows between which the speed is linear"),
         ..NumberArray::new(
             Range::NonNegative,
@@ -166,18 +172,21 @@ fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
         )
     };
     // The range of the speeds is checked with the whole table.
-    let speeds =
-        NumberArray { range: Range::Within(-1e5, 1e5), read_range: Range::Any, ..times.clone() };
-    let mut column =
+    let speeds_form = NumberArray {
+        range: Range::Within(-1e5, 1e5),
+        read_range: Range::Any,
+        ..times_form.clone()
+    };
+    let mut walk_column =
         |key: &'static str, description: &'static str, numbers, column: &mut Vec<f64>| {
             let key = Key::new(key, description).required("an array of numbers");
             matches!(keys.walk_key(key, &Form::Numbers(numbers), column), Field::Present(_))
         };
-    let are_given = [
-        column("time_s", "increasing times from 0, s", times, &mut time_s),
-        column("speed_rpm", "speeds at these times, rpm", speeds, &mut speed_rpm),
+    let columns_are_given = [
+        walk_column("time_s", "increasing times from 0, s", times_form, &mut time_s),
+        walk_column("speed_rpm", "speeds at these times, rpm", speeds_form, &mut speed_rpm),
     ];
-    if keys.section().is_some() && are_given != [true; 2] {
+    if keys.section().is_some() && columns_are_given != [true; 2] {
         // Mistakes of the columns have been reported; the empty table that replaces them is not a
         // further one.
         if let Some(report) = keys.report() {

@@ -230,7 +230,7 @@ fn a_written_machine_reads_back_the_same_bits() {
     machine.springs[1].free_length_m = Some(0.1);
     machine.springs.truncate(3);
     machine.dampers.clear();
-    let mut with_all_elements = super::machine::with_one_of_each();
+    let mut with_all_elements = super::machine::machine_with_every_element();
     with_all_elements.springs[2].cubic_n_per_m3 = 2e6;
     with_all_elements.dampers[0].friction_n = 45.5;
     with_all_elements.dampers[0].friction_linear_speed_m_per_s = Some(0.31);

@@ -27,16 +27,16 @@ const MAX_COMPARED_TURNS: f64 = 20_000.0;
 /// machine's highest frequency, at which a message recommends that method. Basis: at a lower ratio,
 /// stiff bearings or a stiff hinge cause the highest frequency. Doubling it recommends the method
 /// always.
-const MAX_HINT_FREQUENCY_RATIO: f64 = 0.9;
+const MAX_ADDITIVE_FREQUENCY_RATIO: f64 = 0.9;
 
 /// Maximum number of elements and of rows of a spin's table that are checked before a run, over all
 /// points. Basis: their check takes some seconds. Doubling it doubles that time.
-const MAX_CHECKED_ROWS: u64 = 1_000_000_000;
+const MAX_CHECKED_ELEMENTS: u64 = 1_000_000_000;
 
 /// Time to count the turns in a row of a spin's table, relative to the time to check a row. Basis:
 /// turns are counted at each time step of a row. Doubling it halves the number of points that are
 /// accepted with the criterion that compares turns.
-const TURN_COUNT_COST: u64 = 50;
+const TURN_COUNT_COST_RATIO: u64 = 50;
 
 /// Refuses impossible machines and spins at the corners of the grid.
 ///
@@ -46,19 +46,20 @@ const TURN_COUNT_COST: u64 = 50;
 pub(crate) fn check_corners(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let mut input = point_input(plan, &plan.corner_values(0));
-    let varying = VaryingParts::new(plan);
-    if varying.refuse_too_many_points(draft, &input) {
+    let varying_parts = VaryingParts::new(plan);
+    if varying_parts.refuse_too_many_points(draft, &input) {
         return;
     }
-    let mut check = CornerCheck { draft, reported_keys: BTreeSet::new(), is_spin_valid: true };
-    check.check_corner(&input, VaryingParts::ALL);
+    let mut corner_check =
+        CornerCheck { draft, reported_keys: BTreeSet::new(), is_spin_valid: true };
+    corner_check.check_corner(&input, VaryingParts::ALL);
     for corner in 1..plan.corner_count() {
         if draft.report.is_full() {
             // The report has as many mistakes as it shows.
             break;
         }
         write_axis_values(plan, &mut input, &plan.corner_values(corner));
-        check.check_corner(&input, varying);
+        corner_check.check_corner(&input, varying_parts);
     }
 }
 
@@ -75,8 +76,8 @@ impl VaryingParts {
     const ALL: Self = Self { machine: true, spin: true, window: true };
 
     fn new(plan: &Plan) -> Self {
-        let has_axis = |is_part: fn(Target) -> bool| {
-            plan.axes.iter().any(|axis| is_part(axis.parameter.handle.target()))
+        let has_axis = |belongs_to_part: fn(Target) -> bool| {
+            plan.axes.iter().any(|axis| belongs_to_part(axis.parameter.handle.target()))
         };
         Self {
             machine: has_axis(|target| !matches!(target, Target::Spin | Target::Window(_))),
@@ -89,32 +90,36 @@ impl VaryingParts {
     /// refused.
     fn refuse_too_many_points(self, draft: &Draft<'_, Washer>, input: &PointInput) -> bool {
         let PointInput { machine, spin, .. } = input;
-        let elements = ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
-        let rows = match spin {
+        let element_count =
+            ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
+        let row_count = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Ramped { .. } => 1,
         };
         let counts_turns = draft.plan.model.measures.criterion == Criterion::Envelope
             && (self.spin || self.window);
-        let cost_per_point = u64::from(self.machine) * elements
-            + u64::from(self.spin) * rows
-            + u64::from(counts_turns) * rows * TURN_COUNT_COST;
-        let points = draft.plan.corner_count();
-        let max_points = MAX_CHECKED_ROWS / cost_per_point.max(1);
-        if points <= max_points {
+        let cost_per_point = u64::from(self.machine) * element_count
+            + u64::from(self.spin) * row_count
+            + u64::from(counts_turns) * row_count * TURN_COUNT_COST_RATIO;
+        let point_count = draft.plan.corner_count();
+        let max_points = MAX_CHECKED_ELEMENTS / cost_per_point.max(1);
+        if point_count <= max_points {
             return false;
         }
         let title = format!(
-            "too many points to check: {points}, each with {elements} springs, dampers \
-             and the like and a spin of {rows} rows"
+            "too many points to check: {point_count}, each with {element_count} springs, dampers \
+             and the like and a spin of {row_count} rows"
         );
-        let axis = draft.report.location("axis[0]");
-        draft.report.push(axis.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
-            diagnostic.at_location(
-                &location,
-                format!("expected at most {max_points} points of this machine and spin"),
-            )
-        }));
+        let axis_location = draft.report.location("axis[0]");
+        draft.report.push(axis_location.into_iter().fold(
+            Diagnostic::new(title),
+            |diagnostic, location| {
+                diagnostic.at_location(
+                    &location,
+                    format!("expected at most {max_points} points of this machine and spin"),
+                )
+            },
+        ));
         true
     }
 }
@@ -130,27 +135,28 @@ struct CornerCheck<'a> {
 impl CornerCheck<'_> {
     /// Checks the parts that differ from those of the corners before. Single numbers were checked
     /// as they were read; this function checks their combinations.
-    fn check_corner(&mut self, input: &PointInput, changed: VaryingParts) {
-        if changed.machine {
+    fn check_corner(&mut self, input: &PointInput, changed_parts: VaryingParts) {
+        if changed_parts.machine {
             self.report_violations(input.machine.joint_violations());
         }
-        if changed.spin {
+        if changed_parts.spin {
             let violations = input.spin.joint_violations();
             self.is_spin_valid = violations.is_empty();
             self.report_violations(violations);
         }
-        if changed.window {
+        if changed_parts.window {
             check_window(self.draft, input.window_s, &mut self.reported_keys);
         }
-        if (changed.spin || changed.window) && self.is_spin_valid {
+        if (changed_parts.spin || changed_parts.window) && self.is_spin_valid {
             refuse_too_many_turns(self.draft, input, &mut self.reported_keys);
         }
     }
 
     fn report_violations(&mut self, violations: Vec<Violation>) {
         for Violation { title, parameters, expected } in violations {
-            let is_certain = !parameters.iter().any(|key| self.draft.report.is_invalid(key));
-            if is_certain && self.reported_keys.insert(parameters.clone()) {
+            let uses_valid_numbers =
+                !parameters.iter().any(|key| self.draft.report.is_invalid(key));
+            if uses_valid_numbers && self.reported_keys.insert(parameters.clone()) {
                 refuse_numbers(self.draft, title, &parameters, &format!("expected {expected}"));
             }
         }
@@ -163,22 +169,23 @@ fn refuse_too_many_turns(
     input: &PointInput,
     reported_keys: &mut BTreeSet<Vec<String>>,
 ) {
-    let Some(criterion) = draft.report.location("reliability.criterion") else { return };
+    let Some(criterion_location) = draft.report.location("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
-    let turns = input.spin.turns_within(input.window_s);
-    if turns <= MAX_COMPARED_TURNS
+    let turn_count = input.spin.turns_within(input.window_s);
+    if turn_count <= MAX_COMPARED_TURNS
         || !reported_keys.insert(vec!["reliability.criterion".to_owned()])
     {
         return;
     }
     let name = Criterion::Envelope.name();
-    let title =
-        format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
+    let title = format!(
+        "the drum makes {turn_count:.0} turns in the window, too many to compare one by one"
+    );
     let expected =
         format!("expected at most {MAX_COMPARED_TURNS} turns for \"{name}\": shorten the window");
-    draft.report.push(Diagnostic::new(title).at_location(&criterion, expected));
+    draft.report.push(Diagnostic::new(title).at_location(&criterion_location, expected));
 }
 
 /// Refuses a machine whose highest frequency is too high for the method: for the greatest accepted
@@ -198,34 +205,34 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
         |frequency: f64| step_ratio * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
     let is_additive = direct_method(&draft.plan.integrator)
         .is_some_and(|method| method.kind == MethodKind::Additive);
-    let highest_frequency = if is_additive {
+    let highest_frequency_of = if is_additive {
         highest_explicit_frequency_rad_per_s
     } else {
         highest_frequency_rad_per_s
     };
-    let frequency = highest_of_corners_rad_per_s(draft, highest_frequency);
-    let limit_s = RK4_STABILITY_LIMIT / frequency;
+    let highest_rad_per_s = highest_of_corners_rad_per_s(draft, highest_frequency_of);
+    let limit_s = RK4_STABILITY_LIMIT / highest_rad_per_s;
     let has_corners = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
-    let at_corner = if has_corners { ", at the grid's hardest corner" } else { "" };
-    if is_too_fast(frequency) {
-        let steps = end_s / (step_ratio * limit_s);
+    let corner_text = if has_corners { ", at the grid's hardest corner" } else { "" };
+    if is_too_fast(highest_rad_per_s) {
+        let step_count = end_s / (step_ratio * limit_s);
         let end_s = decimal(end_s);
         let name = draft.plan.integrator.name();
-        let needs = format!("\"{name}\" needs {steps:.1e} steps to {end_s} s");
-        let title = format!("the machine is too stiff: {needs}");
+        let step_need_text = format!("\"{name}\" needs {step_count:.1e} steps to {end_s} s");
+        let title = format!("the machine is too stiff: {step_need_text}");
         let location =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.location(key));
         let refusal = location.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
             diagnostic.at_location(&location, format!("expected at most {MAX_STEPS:e} steps"))
         });
-        let hint = if is_too_fast(highest_additive_rad_per_s(draft)) {
+        let hint_text = if is_too_fast(highest_additive_rad_per_s(draft)) {
             ""
         } else {
             ", or use method = \"additive\", which takes stiff bearings in long steps"
         };
         draft.report.push(refusal.with_help(format!(
-            "its highest natural frequency is {frequency:.1e} rad/s{at_corner}: look for a \
-             mistaken mass, moment of inertia or stiffness{hint}"
+            "its highest natural frequency is {highest_rad_per_s:.1e} rad/s{corner_text}: look \
+             for a mistaken mass, moment of inertia or stiffness{hint_text}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(
@@ -233,14 +240,16 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
             decimal(step_s)
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
-        let hint = if highest_additive_rad_per_s(draft) > MAX_HINT_FREQUENCY_RATIO * frequency {
+        let hint_text = if highest_additive_rad_per_s(draft)
+            > MAX_ADDITIVE_FREQUENCY_RATIO * highest_rad_per_s
+        {
             ""
         } else {
             "; method = \"additive\" takes stiff bearings in longer steps"
         };
         draft.report.push(step_mistake(draft, title, &expected).with_help(format!(
-            "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
-             frequency{at_corner}{hint}"
+            "the limit is 2.83 / w with w = {highest_rad_per_s:.0} rad/s, the machine's highest \
+             natural frequency{corner_text}{hint_text}"
         )));
     }
 }
@@ -255,11 +264,11 @@ fn highest_additive_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
 /// row.
 fn highest_of_corners_rad_per_s(
     draft: &Draft<'_, Washer>,
-    highest_rad_per_s: fn(&Point, f64) -> Result<f64, ModesError>,
+    highest_frequency_of: fn(&Point, f64) -> Result<f64, ModesError>,
 ) -> f64 {
     let plan = &draft.plan;
-    let timing = timing(plan);
-    let mut highest = 0.0_f64;
+    let point_timing = timing(plan);
+    let mut highest_of_all = 0.0_f64;
     for values in plan.corners_to_prepare() {
         let PointInput { mut machine, spin, .. } = point_input(plan, &values);
         // The steepest slope of friction bounds the frequency. It holds for a linearisation about
@@ -268,11 +277,13 @@ fn highest_of_corners_rad_per_s(
             damper.free_stroke_m = 0.0;
             damper.friction_linear_speed_m_per_s.get_or_insert(damper.friction_speed_m_per_s);
         }
-        let speed = spin.max_speed_rad_per_s(plan.end_s);
-        for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
+        let max_speed_rad_per_s = spin.max_speed_rad_per_s(plan.end_s);
+        for point in prepare(Simd::Scalar, &[(machine, spin)], &point_timing).into_iter().flatten()
+        {
             // The run reports a machine whose eigenvalues do not converge.
-            highest = highest.max(highest_rad_per_s(&point, speed).unwrap_or(0.0));
+            highest_of_all = highest_of_all
+                .max(highest_frequency_of(&point, max_speed_rad_per_s).unwrap_or(0.0));
         }
     }
-    highest
+    highest_of_all
 }

@@ -9,7 +9,7 @@ use washer_model::{
 };
 use washer_row::{Measures, MetricColumn, Status};
 
-use super::final_state;
+use super::carried_final_state;
 use crate::engine::CarriedState;
 
 /// The data of a row: a motion of a point at a held speed, and one of the motion's turns.
@@ -17,18 +17,18 @@ pub(crate) struct DwellRow {
     /// All motions of the point at this speed, or the reason why there are none.
     pub(super) attractors: Result<Arc<Attractors>, Status>,
     /// The number of the motion.
-    pub(super) motion: usize,
+    pub(super) motion_index: usize,
     /// The number of the turn among the turns of which states are stored; 0 if there are none.
-    pub(super) turn: usize,
+    pub(super) turn_index: usize,
 }
 
 pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
 /// Number of the kinds of settled motions, which come first in [`Attractor::KIND_NAMES`].
-const SETTLED_KINDS: usize = 5;
+const SETTLED_KIND_COUNT: usize = 5;
 
 /// The statuses of rows.
-const STATUSES: [&str; 9] = [
+const STATUS_NAMES: [&str; 9] = [
     "ok",
     "left_range",
     "not_settled",
@@ -46,7 +46,7 @@ impl DwellRow {
     }
 
     fn motion(&self) -> Option<&Attractor> {
-        self.attractors()?.attractors.get(self.motion)
+        self.attractors()?.attractors.get(self.motion_index)
     }
 
     /// Returns the motion, if it stayed within the model's range.
@@ -59,8 +59,8 @@ impl DwellRow {
         self.attractors()?.responses.first()
     }
 
-    fn kind(&self) -> Option<usize> {
-        Some(self.motion()?.kind_index()).filter(|kind| *kind < SETTLED_KINDS)
+    fn settled_kind_index(&self) -> Option<usize> {
+        Some(self.motion()?.kind_index()).filter(|kind| *kind < SETTLED_KIND_COUNT)
     }
 
     fn period_turns(&self) -> Option<u64> {
@@ -77,7 +77,7 @@ impl DwellRow {
         }
     }
 
-    fn life_s(&self) -> Option<f64> {
+    fn transient_life_s(&self) -> Option<f64> {
         match self.motion()?.status {
             AttractorStatus::Transient { life_s } => Some(life_s),
             AttractorStatus::Ok
@@ -91,7 +91,7 @@ impl DwellRow {
         Some(self.attractors()?.is_near_response(motion))
     }
 
-    fn status(&self) -> &'static str {
+    fn status_name(&self) -> &'static str {
         match self.attractors {
             Ok(_) => match self.motion().map(|motion| motion.status) {
                 Some(AttractorStatus::Ok) => "ok",
@@ -115,7 +115,8 @@ fn count_column(name: &str, description: &str, count: fn(&DwellRow) -> Option<u6
 
 /// Returns the columns of the amplitudes of both models, by channel.
 fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
-    let amplitude_kinds: [(&str, &str, fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
+    type AmplitudesOf = fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>;
+    let amplitude_sources: [(&str, &str, AmplitudesOf); 3] = [
         (
             MODEL_NAMES[0],
             "largest deviation from equilibrium over the motion's last turns; null where it left \
@@ -130,27 +131,28 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
         }),
     ];
     let mut columns = Vec::new();
-    for (prefix, description, amplitudes) in amplitude_kinds {
+    for (prefix, description, amplitudes) in amplitude_sources {
         for &channel in channels {
             let description = format!("{}: {description}", channel.description());
             let name = format!("{prefix}_{}", channel.name());
-            let amplitude = move |row: &DwellRow| Some(amplitudes(row)?[channel.index()]);
-            columns.push(ResultColumn::measured(name, channel.unit(), description, amplitude));
+            let amplitude_of = move |row: &DwellRow| Some(amplitudes(row)?[channel.index()]);
+            columns.push(ResultColumn::measured(name, channel.unit(), description, amplitude_of));
         }
     }
     columns
 }
 
 /// Returns all columns in order. `with_sections` adds those of the states at successive turns.
-pub(crate) fn columns(
+pub(crate) fn dwell_columns(
     channels: &[Channel],
     measures: &Measures,
     with_sections: bool,
 ) -> Vec<DwellColumn> {
-    let motion = |row: &DwellRow| Some(row.motion as u64);
+    let motion_number_of = |row: &DwellRow| Some(row.motion_index as u64);
     let description = "number of the motion at this speed: 0 is the one that the disturbed \
                 periodic response ends in";
-    let mut columns = vec![ResultColumn::new("motion", "1", description, CellType::Count, motion)];
+    let mut columns =
+        vec![ResultColumn::new("motion", "1", description, CellType::Count, motion_number_of)];
     let description = "how many starts ended in it; 0 where only a transient did";
     columns.push(count_column("starts", description, |row| Some(u64::from(row.motion()?.starts))));
     let description = "how many starts there were: the disturbed periodic responses, then kicks, \
@@ -175,20 +177,20 @@ pub(crate) fn columns(
     columns.push(ResultColumn::name(
         "kind",
         description,
-        Attractor::KIND_NAMES[..SETTLED_KINDS].to_vec(),
-        DwellRow::kind,
+        Attractor::KIND_NAMES[..SETTLED_KIND_COUNT].to_vec(),
+        DwellRow::settled_kind_index,
     ));
     let description = "after how many turns it repeats; null where it does not";
     columns.push(count_column("period_turns", description, DwellRow::period_turns));
     columns.extend(channel_columns(channels));
-    let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
-    for column in measures.model_columns().filter(is_periodic) {
+    let has_periodic_value = |number: &MetricColumn| number.metric.has_periodic_value();
+    for column in measures.model_columns().filter(has_periodic_value) {
         let description = format!("{}, over 128 further turns of the motion", column.description());
         let description = description.replace(" in the window", "");
         let name = column.column(MODEL_NAMES[0]);
         let unit = column.metric.properties().unit;
-        let value = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra_reading);
-        columns.push(ResultColumn::measured(name, unit, description, value));
+        let value_of = move |row: &DwellRow| column.value(&row.motion_in_range()?.extra_reading);
+        columns.push(ResultColumn::measured(name, unit, description, value_of));
     }
     let measured_columns: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [
         (
@@ -240,7 +242,7 @@ pub(crate) fn columns(
                 leaves slowly";
     columns.push(ResultColumn::flag("near_response", description, DwellRow::is_near_response));
     let description = "mean life of a transient; null of other motions";
-    columns.push(ResultColumn::measured("life_s", "s", description, DwellRow::life_s));
+    columns.push(ResultColumn::measured("life_s", "s", description, DwellRow::transient_life_s));
     let description = "how long its first trajectory was followed";
     columns.push(ResultColumn::measured("followed_s", "s", description, |row: &DwellRow| {
         Some(row.motion()?.time_s)
@@ -248,9 +250,12 @@ pub(crate) fn columns(
     let description = "ok; left_range: it went farther than the model is good for, after \
                 followed_s; not_settled: the largest deviations still change; transient: it \
                 wanders as chaos does, but ends elsewhere after life_s; or why there is no motion";
-    columns.push(ResultColumn::name("status", description, STATUSES.to_vec(), |row: &DwellRow| {
-        STATUSES.iter().position(|status| *status == row.status())
-    }));
+    columns.push(ResultColumn::name(
+        "status",
+        description,
+        STATUS_NAMES.to_vec(),
+        |row: &DwellRow| STATUS_NAMES.iter().position(|status| *status == row.status_name()),
+    ));
     if with_sections {
         columns.extend(section_columns());
     }
@@ -260,13 +265,15 @@ pub(crate) fn columns(
 /// Returns the columns of the state that the search carries to the next speed. Chunks contain them,
 /// so that an interrupted run can continue.
 pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
-    let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.attractors()?)?[i].to_bits());
-    (0..STATE_LEN)
-        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", CellType::Kept, bits(i)))
+    let state_bits_of =
+        |i: usize| move |row: &DwellRow| Some(carried_final_state(row.attractors()?)?[i].to_bits());
+    (0..STATE_LEN).map(move |i| {
+        ResultColumn::new(format!("carried_{i}"), "", "", CellType::Kept, state_bits_of(i))
+    })
 }
 
 /// Returns the state of a known row that the search carries to the next speed.
-pub(super) fn carried_state(known: &PointRows) -> CarriedState {
+pub(super) fn read_carried_state(known: &PointRows) -> CarriedState {
     let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
     let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
     state?.try_into().ok()
@@ -275,18 +282,27 @@ pub(super) fn carried_state(known: &PointRows) -> CarriedState {
 /// Returns the columns of states at successive turns.
 fn section_columns() -> Vec<DwellColumn> {
     let description = "number of the turn among those kept, from 0: what follows is where it ends";
-    let mut columns =
-        vec![count_column("turn", description, |row| row.attractors().map(|_| row.turn as u64))];
+    let mut columns = vec![count_column("turn", description, |row| {
+        row.attractors().map(|_| row.turn_index as u64)
+    })];
     for i in 0..STATE_LEN {
-        let q = i % COORDINATES;
-        let unit = if q < 4 { "m" } else { "rad" };
+        let coordinate_index = i % COORDINATES;
+        let unit = if coordinate_index < 4 { "m" } else { "rad" };
         let (name, unit, description) = match i < COORDINATES {
-            true => (format!("q{}_{unit}", q + 1), unit.to_owned(), "coordinate from equilibrium"),
-            false => (format!("u{}_{unit}_per_s", q + 1), format!("{unit}/s"), "its speed"),
+            true => (
+                format!("q{}_{unit}", coordinate_index + 1),
+                unit.to_owned(),
+                "coordinate from equilibrium",
+            ),
+            false => (
+                format!("u{}_{unit}_per_s", coordinate_index + 1),
+                format!("{unit}/s"),
+                "its speed",
+            ),
         };
-        let value = move |row: &DwellRow| Some(row.motion()?.sections.get(row.turn)?[i]);
+        let value_of = move |row: &DwellRow| Some(row.motion()?.sections.get(row.turn_index)?[i]);
         let description = format!("{description}, where the unbalance is up");
-        columns.push(ResultColumn::measured(name, &unit, description, value));
+        columns.push(ResultColumn::measured(name, &unit, description, value_of));
     }
     columns
 }

@@ -14,14 +14,14 @@ pub(crate) type CarriedState = Option<[f64; STATE_LEN]>;
 /// The first response is that of a machine that runs up. Once `cancel` is requested, the result
 /// is meaningless.
 pub(crate) fn find_responses(
-    dwells: &[HeldSpeed<'_>],
+    held_speeds: &[HeldSpeed<'_>],
     cancel: Cancel<'_>,
 ) -> Vec<Result<Vec<Response>, Status>> {
     let find_group = |dwells: &[HeldSpeed<'_>]| {
-        let answers = washer_model::find_responses(dwells, cancel).into_iter();
-        answers.map(|answer| answer.map_err(Status::from)).collect()
+        let responses_or_errors = washer_model::find_responses(dwells, cancel).into_iter();
+        responses_or_errors.map(|answer| answer.map_err(Status::from)).collect()
     };
-    map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
+    map_isolating_panics(held_speeds, find_group, || Err(Status::Panicked))
 }
 
 /// Returns the fastest growth of disturbances about the response of a machine that runs up, over
@@ -33,14 +33,15 @@ pub(crate) fn find_responses(
 pub(crate) fn fastest_growth(
     responses_at_speeds: &[Result<Vec<Response>, Status>],
 ) -> Option<Growth> {
-    let firsts = || responses_at_speeds.iter().map(|responses| responses.as_ref().ok()?.first());
-    let fastest = firsts().flatten().reduce(|fastest, response| {
+    let first_responses =
+        || responses_at_speeds.iter().map(|responses| responses.as_ref().ok()?.first());
+    let fastest = first_responses().flatten().reduce(|fastest, response| {
         if response.growth_per_s() > fastest.growth_per_s() { response } else { fastest }
     })?;
     let exceeded_limit = fastest
         .exceeded_limit
-        .or_else(|| firsts().flatten().find_map(|first| first.exceeded_limit));
-    let is_on_curve = firsts().all(|first| first.is_some_and(|first| first.is_on_curve));
+        .or_else(|| first_responses().flatten().find_map(|first| first.exceeded_limit));
+    let is_on_curve = first_responses().all(|first| first.is_some_and(|first| first.is_on_curve));
     Some(Growth { exceeded_limit, is_on_curve, ..Growth::from(fastest) })
 }
 
@@ -48,16 +49,17 @@ pub(crate) fn fastest_growth(
 /// Once `cancel` is requested, the result is meaningless.
 pub(crate) fn find_motions(
     simd: Simd,
-    dwells: &[(HeldSpeed<'_>, CarriedState)],
+    held_speeds: &[(HeldSpeed<'_>, CarriedState)],
     starts: &StartRule,
     cancel: Cancel<'_>,
 ) -> Vec<Result<Attractors, Status>> {
     let find_group = |dwells: &[(HeldSpeed<'_>, CarriedState)]| {
-        let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-        let attractors = find_attractors(simd, &dwells, &carried, starts, cancel).into_iter();
+        let (dwells, carried_states): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
+        let attractors =
+            find_attractors(simd, &dwells, &carried_states, starts, cancel).into_iter();
         attractors.map(|attractors| attractors.map_err(Status::from)).collect()
     };
-    map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
+    map_isolating_panics(held_speeds, find_group, || Err(Status::Panicked))
 }
 
 /// Adds the metrics at held speeds (rpm) to the rows of points, which share lanes: the fastest
@@ -69,17 +71,20 @@ pub(super) fn add_held_speed_metrics(
     (speeds_rpm, metrics): (&[f64], &[Metric]),
     cancel: Cancel<'_>,
 ) {
-    let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| HeldSpeed { point, speed_rpm });
-    let dwells: Vec<HeldSpeed<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
+    let held_speeds_of_point =
+        |point| speeds_rpm.iter().map(move |&speed_rpm| HeldSpeed { point, speed_rpm });
+    let held_speeds: Vec<HeldSpeed<'_>> =
+        rows.iter().flat_map(|(_, point)| held_speeds_of_point(*point)).collect();
     if metrics.contains(&Metric::Growth) {
-        let responses = find_responses(&dwells, cancel);
+        let responses = find_responses(&held_speeds, cancel);
         for ((outcome, _), responses) in rows.iter_mut().zip(responses.chunks(speeds_rpm.len())) {
             outcome.growth = fastest_growth(responses);
         }
     }
     if metrics.contains(&Metric::Dwell) {
-        let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
-        let motions = find_motions(simd, &dwells, &StartRule::default(), cancel);
+        let held_speeds_and_states: Vec<_> =
+            held_speeds.iter().map(|dwell| (*dwell, None)).collect();
+        let motions = find_motions(simd, &held_speeds_and_states, &StartRule::default(), cancel);
         for ((outcome, _), motions) in rows.iter_mut().zip(motions.chunks(speeds_rpm.len())) {
             outcome.dwell_peaks = DwellPeaks::from_attractors(speeds_rpm, motions);
         }
@@ -107,12 +112,22 @@ mod tests {
                 participating_modes: Vec::new(),
             }])
         };
-        let [on, other] = [response(240.0, true), response(260.0, true)];
-        let growth =
-            |found: &[_]| fastest_growth(found).map(|it| (it.fastest.speed_rpm, it.is_on_curve));
-        assert_eq!(growth(&[on.clone(), other.clone()]), Some((260.0, true)));
-        assert_eq!(growth(&[response(230.0, false), on, other.clone()]), Some((260.0, false)));
-        assert_eq!(growth(&[Err(Status::NoResponse), other]), Some((260.0, false)));
-        assert_eq!(growth(&[Err(Status::NoResponse)]), None);
+        let [response_on_curve, other_response] = [response(240.0, true), response(260.0, true)];
+        let speed_and_curve = |responses: &[_]| {
+            fastest_growth(responses).map(|growth| (growth.fastest.speed_rpm, growth.is_on_curve))
+        };
+        assert_eq!(
+            speed_and_curve(&[response_on_curve.clone(), other_response.clone()]),
+            Some((260.0, true))
+        );
+        assert_eq!(
+            speed_and_curve(&[response(230.0, false), response_on_curve, other_response.clone()]),
+            Some((260.0, false))
+        );
+        assert_eq!(
+            speed_and_curve(&[Err(Status::NoResponse), other_response]),
+            Some((260.0, false))
+        );
+        assert_eq!(speed_and_curve(&[Err(Status::NoResponse)]), None);
     }
 }

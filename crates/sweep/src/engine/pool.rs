@@ -121,9 +121,9 @@ pub(super) struct Pool<'a> {
     pub(super) sink: &'a OutcomeSink<'a>,
     pub(super) context: &'a RunContext<'a>,
     /// The number of threads that call [`Self::run_worker`].
-    pub(super) threads: usize,
+    pub(super) thread_count: usize,
     pub(super) state: Mutex<PoolState>,
-    pub(super) changed: Condvar,
+    pub(super) state_changed: Condvar,
 }
 
 impl Pool<'_> {
@@ -136,9 +136,11 @@ impl Pool<'_> {
                     |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
                 self.rule().map_or(MAX_LANES, batch_size_by_rule)
             };
-            match state.choose_action(&full_batch_size, self.threads) {
+            match state.choose_action(&full_batch_size, self.thread_count) {
                 ThreadAction::End => break,
-                ThreadAction::Wait => drop(self.changed.wait_timeout(state, STOP_POLL_INTERVAL)),
+                ThreadAction::Wait => {
+                    drop(self.state_changed.wait_timeout(state, STOP_POLL_INTERVAL))
+                }
                 ThreadAction::Prepare => {
                     state.busy_threads += 1;
                     drop(state);
@@ -187,15 +189,15 @@ impl Pool<'_> {
                 }
             }
         }
-        self.changed.notify_all();
+        self.state_changed.notify_all();
     }
 
     /// Returns the rule by which rows are refined; `None` if the context is stopped before the
     /// levels are found.
     fn rule(&self) -> Option<RefinementRule<'_>> {
-        let ModelEngine { demand, rule, .. } = self.engine;
+        let ModelEngine { purpose, row_rule, .. } = self.engine;
         let levels = self.engine.levels_unless_stopped(self.context)?;
-        Some(RefinementRule { levels, purpose: *demand, row_rule: rule })
+        Some(RefinementRule { levels, purpose: *purpose, row_rule })
     }
 
     fn lock_state(&self) -> MutexGuard<'_, PoolState> {
@@ -248,7 +250,7 @@ impl Pool<'_> {
         }
         state.busy_threads -= 1;
         drop(state);
-        self.changed.notify_all();
+        self.state_changed.notify_all();
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
             let is_stopped = || self.context.must_stop();

@@ -1,4 +1,4 @@
-//! The part of tongues in the deviation of the nonlinear model from the linear one.
+//! The share of tongues in the deviation of the nonlinear model from the linear one.
 //!
 //! In a tongue a disturbance grows by the exponential of its e-folds, the integral of the growth
 //! over the time that the run spends there. From these follows, at every instant, how much tongues
@@ -49,8 +49,8 @@ pub(super) fn find_cause<'p>(
     has_passed: bool,
     passages: impl Iterator<Item = (&'p Passage, &'p [[f64; 2]])>,
 ) -> Option<Cause> {
-    let (position, _) = map_result.verdict.greatest?;
-    let channel = map_result.channels[position].index();
+    let (channel_position, _) = map_result.verdict.greatest?;
+    let channel = map_result.channels[channel_position].index();
     let record_history = |model| {
         integrate_history(
             model,
@@ -64,13 +64,13 @@ pub(super) fn find_cause<'p>(
     let channel_value =
         |history: &History<'_>, k: usize| Some(history.instant_outputs(k)?.channels[channel]);
     let instant_count = nonlinear.len().min(linear.len());
-    let values: Option<Vec<[f64; 2]>> = (0..instant_count)
+    let deviations: Option<Vec<[f64; 2]>> = (0..instant_count)
         .map(|k| Some([channel_value(&nonlinear, k)?, channel_value(&linear, k)?]))
         .collect();
-    let values = values?;
-    let amplitude = *map_result.amplitudes[1].get(position)?;
+    let deviations = deviations?;
+    let amplitude = *map_result.amplitudes[1].get(channel_position)?;
     let index_of = |time_s: f64| (time_s / INSTANT_STEP_S) as usize;
-    let window =
+    let window_instants =
         index_of(map_result.window_s[0])..(index_of(map_result.window_s[1]) + 1).min(instant_count);
     let times_s = (0..instant_count).map(|k| k as f64 * INSTANT_STEP_S);
     let speeds_rpm: Vec<f64> = spin.speeds_rpm(times_s).collect();
@@ -78,8 +78,13 @@ pub(super) fn find_cause<'p>(
         .map(|(passage, growths)| find_passage_growth(passage, growths, &speeds_rpm))
         .collect();
     let limit = map_result.limits.upper;
-    let remainder =
-        remove_growth(&values, &passage_growths, window, (amplitude, limit), has_passed)?;
+    let remainder = remove_growth(
+        &deviations,
+        &passage_growths,
+        window_instants,
+        (amplitude, limit),
+        has_passed,
+    )?;
     Some(Cause {
         time_s: remainder.first_instant as f64 * INSTANT_STEP_S,
         speed_rpm: speeds_rpm[remainder.first_instant],
@@ -107,15 +112,15 @@ fn find_passage_growth(
         Some(before) => before..=entry_index,
         None => 0..=instants_per_turn.min(last_index),
     };
-    let mut sum = 0.0;
+    let mut e_fold_sum = 0.0;
     let e_folds = speeds_rpm.iter().enumerate().map(|(k, rpm)| {
         // The part of the interval about the instant that is in the passage.
         let start_s = ((k as f64 - 0.5) * INSTANT_STEP_S).max(from_s);
         let end_s = ((k as f64 + 0.5) * INSTANT_STEP_S).min(to_s);
         if end_s > start_s {
-            sum += (end_s - start_s) * growth_at(growths, rpm.abs());
+            e_fold_sum += (end_s - start_s) * growth_at(growths, rpm.abs());
         }
-        sum
+        e_fold_sum
     });
     let e_folds = e_folds.collect();
     PassageGrowth { entry_instants, e_folds }
@@ -149,39 +154,43 @@ fn remove_growth(
     (amplitude, limit): (f64, f64),
     has_passed: bool,
 ) -> Option<Remainder> {
-    let difference = |k: usize| values.get(k).map_or(0.0, |[a, b]| (a - b).abs());
+    let difference_at = |k: usize| values.get(k).map_or(0.0, |[a, b]| (a - b).abs());
     let entered_tongues: Vec<(f64, &[f64])> = passage_growths
         .iter()
         .map(|growth| {
-            let disturbance = growth.entry_instants.clone().map(difference).fold(0.0, f64::max);
+            let disturbance = growth.entry_instants.clone().map(difference_at).fold(0.0, f64::max);
             (disturbance, growth.e_folds.as_slice())
         })
         .collect();
-    let e_folds = |k: usize| -> f64 { entered_tongues.iter().map(|(_, e_folds)| e_folds[k]).sum() };
+    let e_folds_until = |k: usize| -> f64 {
+        entered_tongues.iter().map(|(_, e_folds_until)| e_folds_until[k]).sum()
+    };
     let deviation_without = |k: usize| -> f64 {
         let [nonlinear, linear] = values[k];
-        let difference = difference(k);
+        let difference = difference_at(k);
         if difference == 0.0 {
             return nonlinear.abs();
         }
-        let mut added_share = -(-e_folds(k)).exp_m1();
+        let mut added_share = -(-e_folds_until(k)).exp_m1();
         if !has_passed {
-            let added_by_tongue =
-                |(disturbance, e_folds): &(f64, &[f64])| disturbance * e_folds[k].exp_m1();
+            let added_by_tongue = |(disturbance, e_folds_until): &(f64, &[f64])| {
+                disturbance * e_folds_until[k].exp_m1()
+            };
             let added_by_tongue: f64 = entered_tongues.iter().map(added_by_tongue).sum();
             added_share = added_share.min(added_by_tongue / difference);
         }
         (linear + (nonlinear - linear) * (1.0 - added_share)).abs()
     };
-    let deviation = |k: &usize| values[*k][0].abs();
-    let greatest_instant = window.clone().max_by(|a, b| deviation(a).total_cmp(&deviation(b)))?;
+    let deviation_at = |k: &usize| values[*k][0].abs();
+    let greatest_instant =
+        window.clone().max_by(|a, b| deviation_at(a).total_cmp(&deviation_at(b)))?;
     let first_beyond_limit =
-        window.clone().find(|k| deviation(k) > limit * amplitude).unwrap_or(greatest_instant);
+        window.clone().find(|k| deviation_at(k) > limit * amplitude).unwrap_or(greatest_instant);
     let amplitude_without = window.map(deviation_without).fold(0.0, f64::max);
     let ratio_without = amplitude_without / amplitude;
     Some(Remainder {
         first_instant: first_beyond_limit,
-        e_folds: e_folds(greatest_instant),
+        e_folds: e_folds_until(greatest_instant),
         ratio_without,
     })
 }
@@ -193,18 +202,18 @@ mod tests {
     /// Returns deviations of both models by instant: an oscillation of the linear model, and a
     /// difference of the given size.
     fn oscillation_with(difference: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
-        let linear = |k: usize| (0.9 * k as f64).sin();
+        let linear_value = |k: usize| (0.9 * k as f64).sin();
         (0..1000)
-            .map(|k| [linear(k) + difference(k) * (0.37 * k as f64).cos(), linear(k)])
+            .map(|k| [linear_value(k) + difference(k) * (0.37 * k as f64).cos(), linear_value(k)])
             .collect()
     }
 
     /// Returns a tongue between two instants, in which a disturbance grows by so many e-folds.
-    fn tongue(from: usize, to: usize, e_folds: f64) -> PassageGrowth {
-        let share = |k: usize| (k.clamp(from, to) - from) as f64 / (to - from) as f64;
+    fn passage_growth_between(from: usize, to: usize, e_folds: f64) -> PassageGrowth {
+        let passed_share = |k: usize| (k.clamp(from, to) - from) as f64 / (to - from) as f64;
         PassageGrowth {
             entry_instants: from - 40..=from,
-            e_folds: (0..1000).map(|k| e_folds * share(k)).collect(),
+            e_folds: (0..1000).map(|k| e_folds * passed_share(k)).collect(),
         }
     }
 
@@ -218,14 +227,14 @@ mod tests {
         move |k| size * (e_folds * (k.clamp(from, to) - from) as f64 / (to - from) as f64).exp()
     }
 
-    fn ratio_without(values: &[[f64; 2]], passage_growths: &[PassageGrowth]) -> f64 {
+    fn compute_ratio_without(values: &[[f64; 2]], passage_growths: &[PassageGrowth]) -> f64 {
         remove_growth(values, passage_growths, 500..1000, (1.0, 2.0), false).unwrap().ratio_without
     }
 
     #[test]
     fn growth_in_a_tongue_is_removed() {
         let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
-        let tongues = [tongue(300, 600, 3.0)];
+        let tongues = [passage_growth_between(300, 600, 3.0)];
         let remainder = remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), false).unwrap();
         assert!(
             remainder.first_instant < 600 && (remainder.e_folds - 3.0).abs() < 1e-9,
@@ -238,7 +247,7 @@ mod tests {
     #[test]
     fn a_tongue_after_the_deviation_is_no_cause() {
         let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
-        let ratio = ratio_without(&values, &[tongue(700, 900, 3.0)]);
+        let ratio = compute_ratio_without(&values, &[passage_growth_between(700, 900, 3.0)]);
         assert!(ratio > 3.0, "{ratio}");
     }
 
@@ -246,7 +255,7 @@ mod tests {
     #[test]
     fn a_tongue_with_little_growth_is_no_cause() {
         let values = oscillation_with(growing_difference(0.2, 300, 600, 3.0));
-        let ratio = ratio_without(&values, &[tongue(300, 400, 0.07)]);
+        let ratio = compute_ratio_without(&values, &[passage_growth_between(300, 400, 0.07)]);
         assert!(ratio > 3.0, "{ratio}");
     }
 
@@ -256,7 +265,7 @@ mod tests {
         let difference = growing_difference(0.5, 200, 400, 3.0);
         let values =
             oscillation_with(|k| difference(k) * (-0.005 * (k.max(400) - 400) as f64).exp());
-        let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
+        let ratio = compute_ratio_without(&values, &[passage_growth_between(200, 400, 3.0)]);
         assert!((1.0..1.6).contains(&ratio), "{ratio}");
     }
 
@@ -264,7 +273,7 @@ mod tests {
     #[test]
     fn a_deviation_that_arises_after_a_tongue_is_not_due_to_it() {
         let values = oscillation_with(|k| if k < 600 { 0.01 } else { 4.0 });
-        let ratio = ratio_without(&values, &[tongue(200, 400, 3.0)]);
+        let ratio = compute_ratio_without(&values, &[passage_growth_between(200, 400, 3.0)]);
         assert!(ratio > 4.0, "{ratio}");
     }
 
@@ -272,24 +281,25 @@ mod tests {
     #[test]
     fn a_deviation_that_passed_through_a_tongue_is_smaller_without_it() {
         let values = oscillation_with(growing_difference(0.1, 300, 700, 3.7));
-        let tongues = [tongue(300, 500, 1.85)];
-        let ratio = |has_passed: bool| {
+        let tongues = [passage_growth_between(300, 500, 1.85)];
+        let ratio_with = |has_passed: bool| {
             remove_growth(&values, &tongues, 500..1000, (1.0, 2.0), has_passed)
                 .unwrap()
                 .ratio_without
         };
-        assert!((1.0..1.8).contains(&ratio(true)), "{}", ratio(true));
-        assert!(ratio(false) > 4.0, "{}", ratio(false));
+        assert!((1.0..1.8).contains(&ratio_with(true)), "{}", ratio_with(true));
+        assert!(ratio_with(false) > 4.0, "{}", ratio_with(false));
     }
 
     #[test]
     fn growths_of_successive_tongues_multiply() {
-        let first = growing_difference(0.1, 100, 300, 1.7);
-        let second = growing_difference(1.0, 400, 600, 1.7);
-        let values = oscillation_with(|k| first(k) * second(k));
-        let tongues = [tongue(100, 300, 1.7), tongue(400, 600, 1.7)];
-        assert!(ratio_without(&values, &tongues[..1]) > 2.0);
-        let ratio = ratio_without(&values, &tongues);
+        let first_growth = growing_difference(0.1, 100, 300, 1.7);
+        let second_growth = growing_difference(1.0, 400, 600, 1.7);
+        let values = oscillation_with(|k| first_growth(k) * second_growth(k));
+        let tongues =
+            [passage_growth_between(100, 300, 1.7), passage_growth_between(400, 600, 1.7)];
+        assert!(compute_ratio_without(&values, &tongues[..1]) > 2.0);
+        let ratio = compute_ratio_without(&values, &tongues);
         assert!((1.0..1.2).contains(&ratio), "{ratio}");
     }
 }

@@ -35,16 +35,16 @@ fn push_line(text: &mut String, name: &str, words: impl AsRef<str>) {
 /// Returns an explanation as text.
 pub(crate) fn to_text(explanation: &Explanation) -> String {
     let mut text = String::new();
-    let parameters: Vec<String> = explanation
+    let parameter_texts: Vec<String> = explanation
         .parameters
         .iter()
         .map(|(name, value)| format!("{name} {}", decimal(*value)))
         .collect();
-    let point = match parameters.is_empty() {
+    let point_text = match parameter_texts.is_empty() {
         true => String::new(),
-        false => format!(" at {}", parameters.join(", ")),
+        false => format!(" at {}", parameter_texts.join(", ")),
     };
-    text += format!("{}{point}", explanation.name).trim_end();
+    text += format!("{}{point_text}", explanation.name).trim_end();
     text.push('\n');
     push_verdict(&mut text, &explanation.map_result);
     for scan in &explanation.scans {
@@ -107,15 +107,15 @@ fn describe_stability(explanation: &Explanation, scan: &SpeedScan) -> String {
     }
     let tongues =
         explanation.tongues.iter().filter(|(tongue, _)| tongue.is_backward == scan.is_backward);
-    let ends: Vec<[TongueEnd; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
-    if !ends.is_empty() {
-        let bands = describe_bands(ends.into_iter());
-        let unstable =
+    let tongue_ends: Vec<[TongueEnd; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
+    if !tongue_ends.is_empty() {
+        let bands = describe_bands(tongue_ends.into_iter());
+        let unstable_text =
             format!("the periodic response is unstable in {bands} from {from} to {to} rpm");
         return if without_response == 0 {
-            format!("{unstable}:")
+            format!("{unstable_text}:")
         } else {
-            format!("{unstable}; {unknown_text}:")
+            format!("{unstable_text}; {unknown_text}:")
         };
     }
     if without_response == 0 {
@@ -140,13 +140,15 @@ fn describe_off_curve(speeds_rpm: &[f64]) -> Option<String> {
 /// Returns the numbers of unstable bands of speed and of the tongues in them. A tongue that ends
 /// because the kind of instability changes does not end its band.
 fn describe_bands(ends: impl ExactSizeIterator<Item = [TongueEnd; 2]>) -> String {
-    let tongues = ends.len();
-    let bands = ends.filter(|[from, _]| *from != TongueEnd::OtherKind).count().max(1);
-    match (bands, tongues) {
+    let tongue_count = ends.len();
+    let band_count = ends.filter(|[from, _]| *from != TongueEnd::OtherKind).count().max(1);
+    match (band_count, tongue_count) {
         (1, 1) => "one band of speed (a \"tongue\")".to_owned(),
-        (1, _) => format!("one band of speed, with {tongues} kinds of growth (\"tongues\"),"),
-        _ if bands == tongues => format!("{bands} bands of speed (\"tongues\")"),
-        _ => format!("{bands} bands of speed, with {tongues} kinds of growth (\"tongues\"),"),
+        (1, _) => format!("one band of speed, with {tongue_count} kinds of growth (\"tongues\"),"),
+        _ if band_count == tongue_count => format!("{band_count} bands of speed (\"tongues\")"),
+        _ => format!(
+            "{band_count} bands of speed, with {tongue_count} kinds of growth (\"tongues\"),"
+        ),
     }
 }
 
@@ -211,7 +213,8 @@ fn push_verdict(text: &mut String, map_result: &MapResult) {
     }
 }
 
-/// Whether the linear model over-estimates a channel, by the limit that summaries of runs use.
+/// Returns whether the linear model over-estimates a channel, by the limit that summaries of runs
+/// use.
 fn over_estimates(map_result: &MapResult) -> bool {
     map_result
         .verdict
@@ -226,7 +229,7 @@ fn push_tongue(
     passages: &[Passage],
 ) {
     let response = &tongue.fastest_response;
-    let kind = match response.kind() {
+    let kind_text = match response.kind() {
         StabilityKind::PeriodDoubling => "its period doubles",
         StabilityKind::QuasiPeriodic => {
             "a second frequency appears that is no multiple of the speed"
@@ -235,17 +238,18 @@ fn push_tongue(
         StabilityKind::Stable => "it is stable",
     };
     let [from, to] = tongue.range_rpm;
-    let growth = format!(
-        "{kind}, growing at up to {:.4} /s at {:.2} rpm",
+    let growth_text = format!(
+        "{kind_text}, growing at up to {:.4} /s at {:.2} rpm",
         response.growth_per_s(),
         response.speed_rpm
     );
     let direction = direction_prefix(tongue.is_backward);
-    let words = format!("{direction}{from:.2} to {to:.2} rpm: {growth}{}", describe_ends(tongue));
+    let words =
+        format!("{direction}{from:.2} to {to:.2} rpm: {growth_text}{}", describe_ends(tongue));
     push_line(text, "tongue", words);
     let low_frequency_cpm = response.frequency_cpm();
     let high_frequency_cpm = response.speed_rpm - response.frequency_cpm();
-    let lines = match response.kind() {
+    let lines_text = match response.kind() {
         StabilityKind::PeriodDoubling => {
             format!("at half the speed, {low_frequency_cpm:.2} per minute")
         }
@@ -257,14 +261,14 @@ fn push_tongue(
             )
         }
     };
-    push_line(text, "lines", lines);
+    push_line(text, "lines", lines_text);
     for mode in &response.participating_modes {
         let number = mode.mode;
         let motion = mode.motion;
         let cpm = mode.frequency_cpm;
         let percent = 100.0 * mode.share;
-        let frequency = format!("{number}, {motion}: {cpm:.2} per minute at this speed");
-        push_line(text, "mode", format!("{frequency}; {percent:.0} % of the energy"));
+        let frequency_text = format!("{number}, {motion}: {cpm:.2} per minute at this speed");
+        push_line(text, "mode", format!("{frequency_text}; {percent:.0} % of the energy"));
     }
     let words = match &tongue.resonance {
         Some(resonance) => describe_resonance(resonance, response.speed_rpm),
@@ -294,7 +298,7 @@ fn describe_ending(motion: &Attractor) -> String {
         format!("{name} {}", format_thousandths(motion.peaks[channel.index()], channel))
     });
     let time_text = format!("after {:.0} s", motion.time_s);
-    let kind = match (motion.motion_kind, motion.status) {
+    let kind_text = match (motion.motion_kind, motion.status) {
         (Some(MotionKind::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
         (Some(MotionKind::Periodic { turns }), _) => format!("repeating every {turns} turns"),
         (Some(MotionKind::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
@@ -309,7 +313,7 @@ fn describe_ending(motion: &Attractor) -> String {
             format!("not settled {time_text}")
         }
     };
-    format!("{}, {kind}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
+    format!("{}, {kind_text}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
 }
 
 fn describe_ends(tongue: &Tongue) -> String {
@@ -337,16 +341,16 @@ fn format_sum(resonance: &ModeResonance) -> String {
 }
 
 fn describe_resonance(resonance: &ModeResonance, speed_rpm: f64) -> String {
-    let target = match resonance.order {
+    let target_text = match resonance.order {
         1 => "the speed".to_owned(),
         order => format!("{order} times the speed"),
     };
     let multiple_cpm = f64::from(resonance.order) * speed_rpm;
     let deviation_percent = 100.0 * (resonance.sum_cpm / multiple_cpm - 1.0);
-    let sum = format_sum(resonance);
+    let sum_text = format_sum(resonance);
     let sum_cpm = resonance.sum_cpm;
     format!(
-        "{sum} = {sum_cpm:.2} per minute, against {target}, {multiple_cpm:.2} \
+        "{sum_text} = {sum_cpm:.2} per minute, against {target_text}, {multiple_cpm:.2} \
          ({deviation_percent:+.2} %)"
     )
 }
@@ -355,25 +359,25 @@ fn push_passage(text: &mut String, passage: &Passage) {
     let [from, to] = passage.interval_s;
     let end_note = if passage.ends_inside { ", where the run ends" } else { "" };
     let e_folds = passage.e_folds;
-    let factor = format_significant(passage.e_folds.exp());
+    let factor_text = format_significant(passage.e_folds.exp());
     let mut words = format!(
-        "from {from:.3} to {to:.3} s{end_note}: {e_folds:.2} e-folds, a factor of {factor}"
+        "from {from:.3} to {to:.3} s{end_note}: {e_folds:.2} e-folds, a factor of {factor_text}"
     );
     match &passage.effect {
         Err(LeftRangeError { time_s }) => {
             words += &format!("; the run leaves the model's range at {time_s:.3} s");
         }
         Ok(effect) => {
-            let amplification = format_significant(effect.amplification);
+            let amplification_text = format_significant(effect.amplification);
             words += &format!(
-                "; a small disturbance of the actual run grows at most {amplification}-fold"
+                "; a small disturbance of the actual run grows at most {amplification_text}-fold"
             );
             if let [Some(before), Some(after)] = effect.departure_j {
                 let numbers = [1e3 * before, 1e3 * after, (after / before).sqrt()];
-                let [before, after, factor] = numbers.map(format_significant);
+                let [before, after, factor_text] = numbers.map(format_significant);
                 words += &format!(
                     "; the run's own departure from the periodic response changes from {before} \
-                     to {after} mJ, a factor of {factor} in amplitude"
+                     to {after} mJ, a factor of {factor_text} in amplitude"
                 );
             }
         }
@@ -384,11 +388,11 @@ fn push_passage(text: &mut String, passage: &Passage) {
 fn push_remedy(text: &mut String, tongue: &Tongue) {
     let words = match tongue.closing {
         Some(Closing::Factor { factor, damping_n_s_per_m, stable_rpm: [from, to] }) => {
-            let dampers = match damping_n_s_per_m {
+            let dampers_text = match damping_n_s_per_m {
                 Some(damping) => format!("{damping:.1} N s/m in every damper ({factor:.2} times)"),
                 None => format!("every damper {factor:.2} times as strong"),
             };
-            format!("with {dampers} nothing grows from {from:.1} to {to:.1} rpm")
+            format!("with {dampers_text} nothing grows from {from:.1} to {to:.1} rpm")
         }
         Some(Closing::NotUpTo { factor }) => {
             format!("dampers up to {factor} times as strong do not close it")
@@ -428,25 +432,26 @@ fn push_conclusion(text: &mut String, explanation: &Explanation) {
                     format_significant(ratio),
                     channel.name()
                 );
-                let growth = describe_growth(explanation.cause.as_ref());
+                let growth_text = describe_growth(explanation.cause.as_ref());
                 let is_cause = explanation.cause.is_some_and(|cause| cause.is_sufficient);
                 match (is_within, ratio < map_result.limits.upper) {
                     (false, true) if is_cause => format!(
                         "{verdict_text}, within the limit: the verdict is due to motion left over \
-                         from before the tongue, and would change with the ramp; {growth}"
+                         from before the tongue, and would change with the ramp; {growth_text}"
                     ),
                     (false, true) => format!(
                         "{verdict_text}, within the limit: the verdict is due to motion left over \
                          from before the tongue, but the tongues are not what made it large: \
-                              {growth}"
+                              {growth_text}"
                     ),
                     (false, false) if is_cause => format!(
                         "{verdict_text}, still beyond the limit: the tongues alone cause the \
-                         verdict, without motion left over from earlier resonances; {growth}"
+                         verdict, without motion left over from earlier resonances; {growth_text}"
                     ),
                     (false, false) => format!(
                         "{verdict_text}, still beyond the limit, but the tongues are not its \
-                         cause: {growth}; the linear model fails on the nonlinear motion itself"
+                         cause: {growth_text}; the linear model fails on the nonlinear \
+                         motion itself"
                     ),
                     (true, true) => format!(
                         "{verdict_text}: the motion keeps the limit because the ramp leaves the \
@@ -527,16 +532,19 @@ mod tests {
 
     #[test]
     fn a_band_continues_where_the_kind_of_growth_changes() {
-        let words = |ends: &[[TongueEnd; 2]]| describe_bands(ends.iter().copied());
+        let bands_text = |ends: &[[TongueEnd; 2]]| describe_bands(ends.iter().copied());
         let unstable_edge = TongueEnd::Edge;
         let other_kind = TongueEnd::OtherKind;
-        assert_eq!(words(&[[unstable_edge, unstable_edge]]), "one band of speed (a \"tongue\")");
         assert_eq!(
-            words(&[[unstable_edge, unstable_edge], [unstable_edge, unstable_edge]]),
+            bands_text(&[[unstable_edge, unstable_edge]]),
+            "one band of speed (a \"tongue\")"
+        );
+        assert_eq!(
+            bands_text(&[[unstable_edge, unstable_edge], [unstable_edge, unstable_edge]]),
             "2 bands of speed (\"tongues\")"
         );
         assert_eq!(
-            words(&[
+            bands_text(&[
                 [unstable_edge, unstable_edge],
                 [unstable_edge, other_kind],
                 [other_kind, unstable_edge]
@@ -547,14 +555,14 @@ mod tests {
 
     #[test]
     fn a_resonance_is_named_by_its_modes() {
-        let resonance = |modes, sign, order| {
+        let resonance_of_modes = |modes, sign, order| {
             let frequencies_cpm = [150.0, 100.0];
             ModeResonance { modes, frequencies_cpm, sign, sum_cpm: 150.0 + sign * 100.0, order }
         };
-        assert_eq!(format_sum(&resonance([2, 2], 1.0, 1)), "2 f2");
-        assert_eq!(format_sum(&resonance([1, 2], 1.0, 1)), "f1 + f2");
-        assert_eq!(format_sum(&resonance([2, 1], -1.0, 1)), "f2 - f1");
-        let words = describe_resonance(&resonance([1, 2], 1.0, 2), 125.0);
+        assert_eq!(format_sum(&resonance_of_modes([2, 2], 1.0, 1)), "2 f2");
+        assert_eq!(format_sum(&resonance_of_modes([1, 2], 1.0, 1)), "f1 + f2");
+        assert_eq!(format_sum(&resonance_of_modes([2, 1], -1.0, 1)), "f2 - f1");
+        let words = describe_resonance(&resonance_of_modes([1, 2], 1.0, 2), 125.0);
         assert_eq!(
             words,
             "f1 + f2 = 250.00 per minute, against 2 times the speed, 250.00 (+0.00 %)"

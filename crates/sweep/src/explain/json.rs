@@ -18,22 +18,22 @@ pub(crate) fn to_json(explanation: &Explanation) -> Value {
             Ok(amplitudes) => {
                 let greatest = explanation.map_result.greatest_ratio(amplitudes);
                 json!({
-                    "amplitudes": by_channel(&explanation.map_result, amplitudes),
+                    "amplitudes": channel_values_json(&explanation.map_result, amplitudes),
                     "ratio_max": greatest.map(|(ratio, _)| ratio),
                     "ratio_max_channel": greatest.map(|(_, channel)| channel.name()),
                 })
             }
             Err(LeftRangeError { time_s }) => json!({ "left_range_at_s": time_s }),
         });
-    let scan = |is_backward: bool| {
+    let scan_json_of_direction = |is_backward: bool| {
         explanation.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
     };
     json!({
         "name": explanation.name,
         "at": explanation.parameters.iter().cloned().collect::<BTreeMap<_, _>>(),
         "swept": map_result_json(&explanation.map_result),
-        "speeds": scan(false),
-        "speeds_backwards": scan(true),
+        "speeds": scan_json_of_direction(false),
+        "speeds_backwards": scan_json_of_direction(true),
         "profile_rpm": explanation.profile_rpm,
         "tongues": tongues.collect::<Value>(),
         "entered_on_responses": without_departures,
@@ -64,9 +64,9 @@ fn scan_json(scan: &SpeedScan) -> Value {
     })
 }
 
-fn by_channel(map_result: &MapResult, amplitudes: &[f64]) -> Value {
-    let name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit());
-    map_result.channels.iter().map(name).zip(amplitudes.iter().copied()).collect()
+fn channel_values_json(map_result: &MapResult, amplitudes: &[f64]) -> Value {
+    let channel_key = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit());
+    map_result.channels.iter().map(channel_key).zip(amplitudes.iter().copied()).collect()
 }
 
 fn map_result_json(map_result: &MapResult) -> Value {
@@ -83,8 +83,8 @@ fn map_result_json(map_result: &MapResult) -> Value {
         "ratios": ratios
             .map(|(channel, ratio)| (channel.name().to_owned(), json!(ratio)))
             .collect::<Value>(),
-        "nonlinear": by_channel(map_result, &map_result.amplitudes[0]),
-        "linear": by_channel(map_result, &map_result.amplitudes[1]),
+        "nonlinear": channel_values_json(map_result, &map_result.amplitudes[0]),
+        "linear": channel_values_json(map_result, &map_result.amplitudes[1]),
         "window_s": map_result.window_s,
     })
 }
@@ -106,7 +106,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], map_result: &MapResult) ->
         "crossed": passages.iter().map(passage_json).collect::<Value>(),
         "ends_in": tongue.ending.as_ref().map(|motion| json!({
             "kind": Attractor::KIND_NAMES[motion.kind_index()],
-            "amplitudes": by_channel(map_result, &map_result.plan_channels(&motion.peaks)),
+            "amplitudes": channel_values_json(map_result, &map_result.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),
         "closed_by": tongue.closing,

@@ -29,7 +29,7 @@ pub(super) fn speed_range_rpm(spin: &Spin, end_s: f64) -> [f64; 2] {
 
 /// Returns equally spaced times (s) and those of the kinks of the profile, in order.
 fn sample_times_s(spin: &Spin, end_s: f64) -> Vec<f64> {
-    let mut times: Vec<f64> = (0..=SAMPLE_INTERVAL_COUNT)
+    let mut times_s: Vec<f64> = (0..=SAMPLE_INTERVAL_COUNT)
         .map(|k| end_s * (k as f64 / SAMPLE_INTERVAL_COUNT as f64))
         .collect();
     let kink_times_s = match spin {
@@ -37,16 +37,20 @@ fn sample_times_s(spin: &Spin, end_s: f64) -> Vec<f64> {
         Spin::Ramped { ramp_s, .. } => vec![*ramp_s],
         Spin::Table { time_s, .. } => time_s.clone(),
     };
-    times.extend(kink_times_s.into_iter().filter(|&kink_s| kink_s < end_s));
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    times
+    times_s.extend(kink_times_s.into_iter().filter(|&kink_s| kink_s < end_s));
+    times_s.sort_by(f64::total_cmp);
+    times_s.dedup();
+    times_s
 }
 
 /// Returns the intervals of time (s) in which the speed is within a band (rpm), in order.
-pub(super) fn intervals_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
+pub(super) fn intervals_inside_s(
+    spin: &Spin,
+    end_s: f64,
+    [low_rpm, high_rpm]: [f64; 2],
+) -> Vec<[f64; 2]> {
     let speed_rpm = |time_s: f64| spin.speeds_rpm([time_s]).next().unwrap_or(0.0);
-    let is_inside = |time_s: f64| (low..=high).contains(&speed_rpm(time_s));
+    let is_inside = |time_s: f64| (low_rpm..=high_rpm).contains(&speed_rpm(time_s));
     let times = sample_times_s(spin, end_s);
     let mut intervals: Vec<[f64; 2]> = Vec::new();
     let mut entry_s = is_inside(0.0).then_some(0.0);
@@ -57,10 +61,10 @@ pub(super) fn intervals_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2])
         // A ramp may pass the whole band between two instants.
         let from_rpm = speed_rpm(from_s);
         let to_rpm = speed_rpm(to_s);
-        let passes_band = !was_inside && !ends_inside && (from_rpm < low) != (to_rpm < low);
+        let passes_band = !was_inside && !ends_inside && (from_rpm < low_rpm) != (to_rpm < low_rpm);
         if passes_band {
             let is_rising = from_rpm < to_rpm;
-            let edges_rpm = if is_rising { [low, high] } else { [high, low] };
+            let edges_rpm = if is_rising { [low_rpm, high_rpm] } else { [high_rpm, low_rpm] };
             intervals.push(edges_rpm.map(|edge_rpm| {
                 let is_before = |time_s: f64| (speed_rpm(time_s) < edge_rpm) == is_rising;
                 bisect_s(&is_before, from_s, to_s)
@@ -113,7 +117,7 @@ pub(super) fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn table(points: &[(f64, f64)]) -> Spin {
+    fn table_spin(points: &[(f64, f64)]) -> Spin {
         Spin::Table {
             time_s: points.iter().map(|point| point.0).collect(),
             speed_rpm: points.iter().map(|point| point.1).collect(),
@@ -132,20 +136,24 @@ mod tests {
         for (found, meant) in intervals_s.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
             assert!(is_nearly_equal(*found, meant), "{found} {meant}");
         }
-        // A run that ends inside the band, and one that begins inside.
+        // The first run ends inside the band, the second one begins inside.
         let intervals_s = intervals_inside_s(&spin, 25.0, [140.0, 210.0]);
         assert!(
             intervals_s.len() == 1
                 && is_nearly_equal(intervals_s[0][0], 20.0)
                 && intervals_s[0][1] == 25.0
         );
-        assert_eq!(intervals_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
+        assert_eq!(
+            intervals_inside_s(&table_spin(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]),
+            [[0.0, 9.0]]
+        );
         assert!(intervals_inside_s(&spin, 100.0, [400.0, 500.0]).is_empty());
     }
 
     #[test]
     fn a_band_is_found_even_if_it_is_passed_quickly() {
-        let spin = table(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
+        let spin =
+            table_spin(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
         let intervals_s = intervals_inside_s(&spin, 100.0, [100.0, 200.0]);
         assert_eq!(intervals_s.len(), 2);
         for (found, meant) in intervals_s.iter().flatten().zip([50.00025, 50.0005, 70.005, 70.0075])
@@ -165,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_profile_may_turn_both_ways_and_pause() {
-        let spin = table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
+        let spin = table_spin(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
         assert_eq!(speed_range_rpm(&spin, 12.0), [-50.0, 100.0]);
         assert_eq!(speed_range_rpm(&spin, 3.0), [0.0, 100.0]);
         let intervals_s = intervals_inside_s(&spin, 12.0, [-40.0, -25.0]);

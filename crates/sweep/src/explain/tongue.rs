@@ -242,16 +242,17 @@ pub(crate) fn find_tongues(
     let fold_speeds = on_curve.filter_map(|response| response.fold_speeds_rpm[1]);
     let mut jumps_rpm: Vec<f64> = fold_speeds.filter(|&rpm| rpm <= speeds.to_rpm).collect();
     jumps_rpm.dedup();
-    let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);
+    let kind_of = |response: &Option<Response>| response.as_ref().map(Response::kind);
     let mut tongues = Vec::new();
     let mut next_index = 0_usize;
-    for same_kind in responses.chunk_by(|a, b| kind(a) == kind(b)) {
+    for responses_of_kind in responses.chunk_by(|a, b| kind_of(a) == kind_of(b)) {
         let response_before = next_index.checked_sub(1).map(|last| &responses[last]);
-        next_index += same_kind.len();
-        let unstable_kind = kind(&same_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
+        next_index += responses_of_kind.len();
+        let unstable_kind =
+            kind_of(&responses_of_kind[0]).filter(|kind| *kind != StabilityKind::Stable);
         let Some(unstable_kind) = unstable_kind else { continue };
-        let unstable_responses: Vec<&Response> = same_kind.iter().flatten().collect();
-        let find_edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
+        let unstable_responses: Vec<&Response> = responses_of_kind.iter().flatten().collect();
+        let locate_edge = |inside: &Response, outside: Option<&Option<Response>>| match outside {
             None => (inside.speed_rpm, TongueEnd::Range),
             Some(None) => (inside.speed_rpm, TongueEnd::NoResponse),
             Some(Some(other)) => {
@@ -261,9 +262,11 @@ pub(crate) fn find_tongues(
                 (rpm, if is_stable { TongueEnd::Edge } else { TongueEnd::OtherKind })
             }
         };
-        let lower_edge = find_edge(unstable_responses[0], response_before);
-        let upper_edge =
-            find_edge(unstable_responses[unstable_responses.len() - 1], responses.get(next_index));
+        let lower_edge = locate_edge(unstable_responses[0], response_before);
+        let upper_edge = locate_edge(
+            unstable_responses[unstable_responses.len() - 1],
+            responses.get(next_index),
+        );
         tongues.push(measure_tongue(
             finder,
             unstable_kind,
@@ -294,11 +297,11 @@ pub(crate) fn find_endings(
     finder: &ResponseFinder<'_>,
     tongues: &[Tongue],
 ) -> Vec<Option<Attractor>> {
-    let held_speed = |tongue: &Tongue| HeldSpeed {
+    let held_speed_of = |tongue: &Tongue| HeldSpeed {
         point: finder.point,
         speed_rpm: tongue.fastest_response.speed_rpm,
     };
-    let held_speeds: Vec<HeldSpeed<'_>> = tongues.iter().map(held_speed).collect();
+    let held_speeds: Vec<HeldSpeed<'_>> = tongues.iter().map(held_speed_of).collect();
     let responses =
         tongues.iter().map(|tongue| Ok(vec![tongue.fastest_response.clone()])).collect();
     let starts = StartRule { start_count: 1, ..StartRule::default() };
@@ -325,13 +328,13 @@ fn measure_tongue(
         }
     }
     growths.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let fastest_response = fastest_response(finder, kind, responses, &growths);
+    let fastest_response = find_fastest_response(finder, kind, responses, &growths);
     let speed_rpm = fastest_response.speed_rpm;
     let index = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
     if growths.get(index).is_none_or(|[rpm, _]| *rpm != speed_rpm) {
         growths.insert(index, speed_and_growth(&fastest_response));
     }
-    let resonance = nearest_resonance(finder.point, &fastest_response);
+    let resonance = find_nearest_resonance(finder.point, &fastest_response);
     Tongue {
         is_backward: finder.is_backward,
         range_rpm: [lower_edge.0, upper_edge.0],
@@ -362,13 +365,13 @@ fn trials_about_root(inside: [f64; 2], outside: [f64; 2], tolerance: f64) -> Vec
     let root = if linear_root.is_nan() { 0.5 } else { linear_root };
     let difference = outside[0] - inside[0];
     let shares_about_root = ROOT_OFFSETS.map(|offset| root + offset * tolerance / difference.abs());
-    let mut shares: Vec<f64> =
+    let mut trial_shares: Vec<f64> =
         shares_about_root.into_iter().filter(|share| *share > 0.0 && *share < 1.0).collect();
-    if shares.len() < ROOT_OFFSETS.len() {
-        shares.push(0.5);
-        shares.sort_by(f64::total_cmp);
+    if trial_shares.len() < ROOT_OFFSETS.len() {
+        trial_shares.push(0.5);
+        trial_shares.sort_by(f64::total_cmp);
     }
-    shares.into_iter().map(|share| inside[0] + share * difference).collect()
+    trial_shares.into_iter().map(|share| inside[0] + share * difference).collect()
 }
 
 /// Returns the speed (rpm) at which a kind of instability ends, between a speed with this kind and
@@ -399,18 +402,19 @@ fn find_edge_rpm(
 
 /// Returns the response of a kind with the greatest growth, at a speed of the run or between two
 /// speeds of the run.
-fn fastest_response(
+fn find_fastest_response(
     finder: &ResponseFinder<'_>,
     kind: StabilityKind,
     responses: &[&Response],
     growths: &[[f64; 2]],
 ) -> Response {
-    let by_growth = |a: &&Response, b: &&Response| a.growth_per_s().total_cmp(&b.growth_per_s());
+    let compare_growth =
+        |a: &&Response, b: &&Response| a.growth_per_s().total_cmp(&b.growth_per_s());
     let mut fastest: Response =
-        (*responses.iter().copied().max_by(by_growth).unwrap_or(responses[0])).clone();
+        (*responses.iter().copied().max_by(compare_growth).unwrap_or(responses[0])).clone();
     let index = growths.partition_point(|[rpm, _]| *rpm < fastest.speed_rpm);
-    let rpm_at = |k: usize| growths.get(k).map_or(fastest.speed_rpm, |[rpm, _]| *rpm);
-    let mut bracket_rpm = [rpm_at(index.saturating_sub(1)), rpm_at(index + 1)];
+    let speed_at = |k: usize| growths.get(k).map_or(fastest.speed_rpm, |[rpm, _]| *rpm);
+    let mut bracket_rpm = [speed_at(index.saturating_sub(1)), speed_at(index + 1)];
     for _ in 0..PEAK_ROUND_COUNT {
         let [low_rpm, high_rpm] = bracket_rpm;
         let trials = speeds_between(low_rpm, high_rpm, TRIALS_PER_INTERVAL);
@@ -429,12 +433,12 @@ fn fastest_response(
 /// Returns the sum or difference of the modes' frequencies that is nearest to a multiple of the
 /// speed. A period doubling admits odd multiples, a fold even ones, and both twice the frequency of
 /// one mode.
-fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance> {
-    let frequencies = |speed_rpm: f64| -> Option<Vec<f64>> {
+fn find_nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance> {
+    let frequencies_at_speed = |speed_rpm: f64| -> Option<Vec<f64>> {
         let modes_at_speed = modes(point, 0.0, speed_rpm * core::f64::consts::TAU / 60.0).ok()?;
         Some(modes_at_speed.modes.iter().map(washer_model::Mode::frequency_rpm).collect())
     };
-    let frequencies = frequencies(response.speed_rpm)?;
+    let frequencies = frequencies_at_speed(response.speed_rpm)?;
     let participants: Vec<usize> =
         response.participating_modes.iter().map(|mode| mode.mode - 1).collect();
     let pairs: Vec<(usize, usize)> = match (response.kind(), participants.as_slice()) {
@@ -446,12 +450,12 @@ fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance
         (StabilityKind::QuasiPeriodic, &[one, other, ..]) => vec![(one, other)],
         (_, participants) => participants.iter().map(|&one| (one, one)).collect(),
     };
-    let is_admitted = |order: &u32| match response.kind() {
+    let is_admitted_order = |order: &u32| match response.kind() {
         StabilityKind::PeriodDoubling => order % 2 == 1,
         StabilityKind::Fold => order.is_multiple_of(2),
         StabilityKind::QuasiPeriodic | StabilityKind::Stable => true,
     };
-    let resonance = |(one, other): (usize, usize), sign: f64, order: u32| {
+    let resonance_of_pair = |(one, other): (usize, usize), sign: f64, order: u32| {
         // Sums name the lower mode first, differences the higher frequency.
         let is_swapped =
             if sign > 0.0 { one > other } else { frequencies[one] < frequencies[other] };
@@ -460,18 +464,19 @@ fn nearest_resonance(point: &Point, response: &Response) -> Option<ModeResonance
         let sum_cpm = frequencies_cpm[0] + sign * frequencies_cpm[1];
         ModeResonance { modes: modes.map(|mode| mode + 1), frequencies_cpm, sign, sum_cpm, order }
     };
-    let orders = || (1..=MAX_ORDER).filter(is_admitted);
+    let orders = || (1..=MAX_ORDER).filter(is_admitted_order);
     let candidates = pairs.iter().flat_map(|&pair| {
         let resonances_of_pair =
             [1.0, -1.0].into_iter().flat_map(|sign| orders().map(move |order| (sign, order)));
-        resonances_of_pair.map(move |(sign, order)| resonance(pair, sign, order))
+        resonances_of_pair.map(move |(sign, order)| resonance_of_pair(pair, sign, order))
     });
-    let distance = |resonance: &ModeResonance| {
+    let distance_to_multiple = |resonance: &ModeResonance| {
         let multiple_rpm = f64::from(resonance.order) * response.speed_rpm;
         (resonance.sum_cpm / multiple_rpm - 1.0).abs()
     };
-    let nearest = candidates.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    nearest.filter(|nearest| distance(nearest) < MAX_RESONANCE_DISTANCE)
+    let nearest =
+        candidates.min_by(|a, b| distance_to_multiple(a).total_cmp(&distance_to_multiple(b)));
+    nearest.filter(|nearest| distance_to_multiple(nearest) < MAX_RESONANCE_DISTANCE)
 }
 
 /// Returns the factors of the damping to try next, between that of `open_trial`, with which the
@@ -502,7 +507,7 @@ impl Tongue {
         if dampers.iter().all(|damper| damper.damping_n_s_per_m == 0.0) {
             return Closing::NoDampers;
         }
-        // Pairs of a factor and the growth that it leaves.
+        // A trial is a factor of the damping, with the growth at this factor.
         let mut open_trial = [1.0, self.fastest_response.growth_per_s()];
         let mut closed_trial: Option<[f64; 2]> = None;
         while closed_trial.is_none_or(|closed_trial| {
@@ -601,7 +606,7 @@ impl Tongue {
             speed_count = TRIALS_PER_INTERVAL;
         }
         let mut growths = growths.into_iter();
-        let growth = |point: &Option<Point>| point.as_ref().and_then(|_| growths.next());
-        points.iter().map(growth).map(|growth| growth.unwrap_or(f64::INFINITY)).collect()
+        let next_growth = |point: &Option<Point>| point.as_ref().and_then(|_| growths.next());
+        points.iter().map(next_growth).map(|growth| growth.unwrap_or(f64::INFINITY)).collect()
     }
 }

@@ -212,7 +212,7 @@ impl Problem<'_> {
         number_sources
     }
 
-    /// Whether an unknown matters to a case.
+    /// Returns whether an unknown matters to a case.
     fn unknown_affects_case(&self, unknown: usize, case: usize) -> bool {
         match self.free_parameters.get(unknown) {
             Some(free) => free.belongs_to(case),

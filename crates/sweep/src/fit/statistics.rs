@@ -594,7 +594,8 @@ fn correlation(values: &[f64], lag: usize) -> f64 {
     dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
 }
 
-/// Whether the correlations of a residual are within the random errors of those of white noise.
+/// Returns whether the correlations of a residual are within the random errors of those of white
+/// noise.
 ///
 /// G. E. P. Box, D. A. Pierce, Journal of the American Statistical Association 65 (1970),
 /// 1509-1526.

@@ -92,9 +92,9 @@ impl EvaluationTask<'_> {
             let row = if context.must_stop() { None } else { lock(&rows).next() }?;
             Some((row, (job.axis_values)(row)))
         };
-        let last = job.points.saturating_sub(1);
+        let last_row = job.points.saturating_sub(1);
         // A panic is a defect of this program.
-        let engine_error = |reason| StoreError::Engine { first: 0, last, reason };
+        let engine_error = |reason| StoreError::Engine { first: 0, last: last_row, reason };
         let collector = BatchCollector::new(job);
         let progress = Progress::new(execution.progress, job.points, 0);
         let sink = |outcome| {
@@ -135,10 +135,11 @@ impl<'a> BatchCollector<'a> {
 
     /// Adds a row, and completes its batch if the row is the last one.
     fn add(&self, outcome: PointRows, context: &RunContext<'_>) {
-        let rows = BATCH_ROWS as u64;
-        let batch_index = outcome.point / rows;
-        let size = rows.min(self.job.points - batch_index * rows);
-        if let Some(outcomes) = self.incomplete_batches.add_result(batch_index, size, outcome) {
+        let rows_per_batch = BATCH_ROWS as u64;
+        let batch_index = outcome.point / rows_per_batch;
+        let batch_size = rows_per_batch.min(self.job.points - batch_index * rows_per_batch);
+        if let Some(outcomes) = self.incomplete_batches.add_result(batch_index, batch_size, outcome)
+        {
             let batch = self.build_batch(outcomes);
             lock(&self.batches).insert(batch_index, batch);
         }
@@ -148,13 +149,13 @@ impl<'a> BatchCollector<'a> {
     fn build_batch(&self, mut outcomes: Vec<PointRows>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
-        let mut rows = BatchBuilder::with_schema(layout, SchemaRef::clone(&self.schema));
+        let mut batch_builder = BatchBuilder::with_schema(layout, SchemaRef::clone(&self.schema));
         for outcome in outcomes {
             for row in outcome.rows {
-                rows.push_row(outcome.point, (self.job.axis_values)(outcome.point), row);
+                batch_builder.push_row(outcome.point, (self.job.axis_values)(outcome.point), row);
             }
         }
-        rows.take_batch()
+        batch_builder.take_batch()
     }
 
     /// Returns all batches in order, including incomplete ones.
@@ -187,8 +188,8 @@ mod tests {
         let execution =
             Execution { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
         let table = evaluator.task_for_all_points().unwrap().compute_in_memory(execution).unwrap();
-        let [first, second] = table.batches() else { panic!("{table:?}") };
-        assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
-        assert!(Arc::ptr_eq(&first.schema(), &second.schema()));
+        let [first_batch, second_batch] = table.batches() else { panic!("{table:?}") };
+        assert_eq!([first_batch.num_rows(), second_batch.num_rows()], [BATCH_ROWS, 1]);
+        assert!(Arc::ptr_eq(&first_batch.schema(), &second_batch.schema()));
     }
 }

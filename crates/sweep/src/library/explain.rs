@@ -34,14 +34,14 @@ pub fn explain_point(
     execution: Execution<'_>,
 ) -> Result<Option<CommandReport>, Error> {
     let (plan, parameters) = grid.load_point(point_values)?;
-    let parse = |speeds: &[f64]| {
+    let speeds_of_values = |speeds: &[f64]| {
         Speeds::from_values(speeds).filter(|speeds| speeds.from_rpm > 0.0).ok_or_else(|| {
             let expected = "at least two equally spaced speeds in rpm above 0, as those of \
                             range(200, 351)";
             speeds_error(speeds.len(), expected.to_owned())
         })
     };
-    let speeds = speeds_rpm.map(parse).transpose()?;
+    let speeds = speeds_rpm.map(speeds_of_values).transpose()?;
     let explanation = explain(&plan, parameters, speeds, execution)?;
     if execution.interrupt.is_raised() {
         return Ok(None);
@@ -62,9 +62,9 @@ mod tests {
 
     #[test]
     fn an_interrupt_ends_an_explanation() {
-        let text =
+        let grid_text =
             "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\ntime = { end_s = 5 }\n";
-        let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
+        let grid = WasherGridInput::text("grid", grid_text.to_owned(), Vec::new());
         // An explanation at all these speeds would take minutes.
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
@@ -75,10 +75,14 @@ mod tests {
                 scope.spawn(|| explain_point(&grid, &[], Some(&speeds), execution));
             std::thread::sleep(Duration::from_millis(500));
             assert!(!explaining_thread.is_finished(), "it is too short");
-            let start = Instant::now();
+            let start_instant = Instant::now();
             interrupt.raise(2);
             let explanation = explaining_thread.join().unwrap();
-            assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+            assert!(
+                start_instant.elapsed() < Duration::from_secs(5),
+                "{:?}",
+                start_instant.elapsed()
+            );
             explanation
         });
         assert!(explanation.unwrap().is_none());

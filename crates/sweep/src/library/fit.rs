@@ -61,18 +61,18 @@ mod tests {
             draws: 0,
         };
         let grid = WasherGridInput::text("fit", String::new(), Vec::new());
-        let message = |options: &FitOptions| {
+        let refusal_message = |options: &FitOptions| {
             fit_tables(&grid, Vec::new(), options, execution()).unwrap_err().to_string()
         };
-        assert!(message(&options).contains("a table or more"));
-        let too_many = 1_000_000_000;
-        for wrong in [
-            FitOptions { starts: too_many, ..options.clone() },
+        assert!(refusal_message(&options).contains("a table or more"));
+        let excessive_count = 1_000_000_000;
+        for wrong_options in [
+            FitOptions { starts: excessive_count, ..options.clone() },
             FitOptions { starts: 0, ..options.clone() },
-            FitOptions { bootstrap: too_many, ..options.clone() },
-            FitOptions { draws: too_many, ..options.clone() },
+            FitOptions { bootstrap: excessive_count, ..options.clone() },
+            FitOptions { draws: excessive_count, ..options.clone() },
         ] {
-            let refused = wrong.check().unwrap_err().to_string();
+            let refused = wrong_options.check().unwrap_err().to_string();
             assert!(refused.contains("a number from"), "{refused}");
         }
         assert!(options.check().is_ok());

@@ -32,9 +32,9 @@ pub fn find_modes(
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
     let input = ModesInput::new(grid, point_values, speeds_rpm[speeds_rpm.len() - 1])?;
     let analysis = ModeAnalysis::new(&input, speeds_rpm, false, Cancel::Flag(interrupt.flag()))?;
-    let table =
+    let table_of_analysis =
         |analysis: ModeAnalysis| MemoryTable::from_table(FileKind::Modes, analysis.table(&input));
-    analysis.map(table).transpose()
+    analysis.map(table_of_analysis).transpose()
 }
 
 /// A machine whose modes are computed, with its name and the run for which friction is linearised.
@@ -118,8 +118,8 @@ impl ModeAnalysis {
     /// Returns the modes as JSON.
     pub(crate) fn to_json(&self, name: &str) -> Value {
         let modes = self.modes.iter().enumerate().map(|(k, mode)| {
-            let mut entry = mode_properties(k, mode);
-            let with_exact = |(i, mode): (usize, &ModeAtSpeed)| {
+            let mut mode_json = mode_properties(k, mode);
+            let speed_json = |(i, mode): (usize, &ModeAtSpeed)| {
                 let mut at_speed_json = mode_at_speed_json(self.speeds_rpm[i], mode);
                 if let Some(exact) = self.exact_modes.as_ref().and_then(|modes| modes[i][k]) {
                     at_speed_json["exact_frequency_rpm"] = exact.frequency_rpm().into();
@@ -127,32 +127,43 @@ impl ModeAnalysis {
                 }
                 at_speed_json
             };
-            entry["at_speed"] = mode.modes_at_speeds.iter().enumerate().map(with_exact).collect();
-            entry
+            mode_json["at_speed"] =
+                mode.modes_at_speeds.iter().enumerate().map(speed_json).collect();
+            mode_json
         });
-        let mut json = json!({ "name": name, "modes": modes.collect::<Value>() });
+        let mut analysis_json = json!({ "name": name, "modes": modes.collect::<Value>() });
         if !self.friction_speeds.is_empty() {
-            json["friction_speeds_m_per_s"] = self.friction_speeds.clone().into();
+            analysis_json["friction_speeds_m_per_s"] = self.friction_speeds.clone().into();
         }
-        json
+        analysis_json
     }
 
     /// Returns the modes as a table, with the properties of each mode in the metadata.
     pub(crate) fn table(&self, ModesInput { name, constants, machine, .. }: &ModesInput) -> Table {
-        let speeds = &self.speeds_rpm;
+        let speeds_rpm = &self.speeds_rpm;
         let modes = &self.modes;
-        let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
+        let speed_and_mode_indices =
+            || (0..speeds_rpm.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);
-        let speed = rows().map(|(k, _)| Some(speeds[k]));
-        table.add_numbers("speed_rpm", "rpm", "spin of the shaft", speed);
+        let speed_values = speed_and_mode_indices().map(|(k, _)| Some(speeds_rpm[k]));
+        table.add_numbers("speed_rpm", "rpm", "spin of the shaft", speed_values);
         let description = "number of the mode, by its frequency at the lowest speed";
-        table.add_counts("mode", description, rows().map(|(_, mode)| mode as u64 + 1));
-        let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
+        table.add_counts(
+            "mode",
+            description,
+            speed_and_mode_indices().map(|(_, mode)| mode as u64 + 1),
+        );
+        let mode_names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
         let description = "what moves, at the first resonance or the lowest speed";
-        table.add_words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
+        table.add_words(
+            "name",
+            description,
+            speed_and_mode_indices().map(|(_, mode)| mode_names[mode].as_str()),
+        );
         let mut add_column =
             |name: &str, unit: &str, description: &str, value: fn(&ModeAtSpeed) -> f64| {
-                let values = rows().map(|(k, mode)| Some(value(&modes[mode].modes_at_speeds[k])));
+                let values = speed_and_mode_indices()
+                    .map(|(k, mode)| Some(value(&modes[mode].modes_at_speeds[k])));
                 table.add_numbers(name, unit, description, values);
             };
         let description = "damped natural frequency in cycles per minute, mean over a turn";
@@ -173,7 +184,8 @@ impl ModeAnalysis {
         if let Some(exact_modes) = &self.exact_modes {
             let mut add_exact_column =
                 |name: &str, unit: &str, description: &str, value: fn(&FloquetMode) -> f64| {
-                    let values = rows().map(|(k, mode)| exact_modes[k][mode].as_ref().map(value));
+                    let values = speed_and_mode_indices()
+                        .map(|(k, mode)| exact_modes[k][mode].as_ref().map(value));
                     table.add_numbers(name, unit, description, values);
                 };
             let description = "frequency by the linear model's Floquet exponent over whole turns, \
@@ -187,9 +199,9 @@ impl ModeAnalysis {
             plan["set"] = constants.clone().into();
         }
         table.add_metadata(key::PLAN, &plan);
-        let entries: Value =
+        let mode_entries: Value =
             modes.iter().enumerate().map(|(k, mode)| mode_properties(k, mode)).collect();
-        table.add_metadata(key::MODES, &entries);
+        table.add_metadata(key::MODES, &mode_entries);
         table
     }
 }
@@ -200,25 +212,26 @@ fn find_exact_modes(
     speeds_rpm: &[f64],
     modes: &[ModeOverSpeed],
 ) -> Result<Vec<Vec<Option<FloquetMode>>>, Error> {
-    let modes_at_speed = |(k, &speed): (usize, &f64)| -> Result<Vec<Option<FloquetMode>>, Error> {
-        if speed == 0.0 {
-            return Ok(vec![None; modes.len()]);
-        }
-        let motions = floquet_modes(point, speed).map_err(Error::model)?;
-        let exact_modes = |mode: &ModeOverSpeed| {
-            motions
-                .iter()
-                .find(|motion| motion.frozen_mode.shape == mode.modes_at_speeds[k].shape)
-                .copied()
+    let exact_modes_at_speed =
+        |(k, &speed): (usize, &f64)| -> Result<Vec<Option<FloquetMode>>, Error> {
+            if speed == 0.0 {
+                return Ok(vec![None; modes.len()]);
+            }
+            let floquet_modes_at_speed = floquet_modes(point, speed).map_err(Error::model)?;
+            let matching_motion = |mode: &ModeOverSpeed| {
+                floquet_modes_at_speed
+                    .iter()
+                    .find(|motion| motion.frozen_mode.shape == mode.modes_at_speeds[k].shape)
+                    .copied()
+            };
+            Ok(modes.iter().map(matching_motion).collect())
         };
-        Ok(modes.iter().map(exact_modes).collect())
-    };
-    speeds_rpm.iter().enumerate().map(modes_at_speed).collect()
+    speeds_rpm.iter().enumerate().map(exact_modes_at_speed).collect()
 }
 
 /// Returns the name, the participation of motions and the resonances of a mode.
 fn mode_properties(k: usize, mode: &ModeOverSpeed) -> Value {
-    let resonance = |resonance: &washer_model::Resonance| {
+    let resonance_json = |resonance: &washer_model::Resonance| {
         mode_at_speed_json(resonance.speed_rpm, &resonance.mode)
     };
     let motion = &mode.motion;
@@ -231,12 +244,12 @@ fn mode_properties(k: usize, mode: &ModeOverSpeed) -> Value {
             "rocking_horizontal": motion.yaw_share,
             "rocking_vertical": motion.pitch_share,
         },
-        "resonances": mode.resonances.iter().map(resonance).collect::<Value>(),
+        "resonances": mode.resonances.iter().map(resonance_json).collect::<Value>(),
     })
 }
 
 fn mode_at_speed_json(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
-    let coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(mode.shape[i])));
+    let named_coordinates = (0..COORDINATES).map(|i| (format!("q{}", i + 1), json!(mode.shape[i])));
     json!({
         "speed_rpm": speed_rpm,
         "frequency_rpm": mode.frequency_rpm,
@@ -244,6 +257,6 @@ fn mode_at_speed_json(speed_rpm: f64, mode: &ModeAtSpeed) -> Value {
         "frequency_max_rpm": mode.max_frequency_rpm,
         "damping_ratio": mode.damping_ratio,
         "eigenvalue": [mode.re_per_s, mode.im_rad_per_s],
-        "shape": coordinates.collect::<serde_json::Map<_, _>>(),
+        "shape": named_coordinates.collect::<serde_json::Map<_, _>>(),
     })
 }

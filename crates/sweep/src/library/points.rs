@@ -15,7 +15,7 @@ use sweep_files::cells;
 pub struct PointTable {
     names: Vec<String>,
     columns: Vec<Float64Array>,
-    rows: usize,
+    row_count: usize,
 }
 
 impl PointTable {
@@ -25,12 +25,13 @@ impl PointTable {
     /// Returns [`Diagnostics`] for a column that has no numbers.
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
         // Filtered or sorted data frames have an index column, which is ignored.
-        let is_data = |k: &usize| !is_index_column(schema.field(*k).name());
-        let data_columns: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
+        let is_data_column = |k: &usize| !is_index_column(schema.field(*k).name());
+        let data_column_indices: Vec<usize> =
+            (0..schema.fields().len()).filter(is_data_column).collect();
         let names: Vec<String> =
-            data_columns.iter().map(|k| schema.field(*k).name().clone()).collect();
+            data_column_indices.iter().map(|k| schema.field(*k).name().clone()).collect();
         let mut columns = Vec::with_capacity(names.len());
-        for (position, k) in data_columns.into_iter().enumerate() {
+        for (position, k) in data_column_indices.into_iter().enumerate() {
             let field = schema.field(k);
             let not_numbers_error =
                 || not_numbers_mistake(&names, position, &field.data_type().to_string());
@@ -46,12 +47,12 @@ impl PointTable {
                 columns.push(column.clone());
                 continue;
             }
-            let column_parts = batches.iter().map(|batch| cells::numbers(batch.column(k)));
+            let batch_columns = batches.iter().map(|batch| cells::numbers(batch.column(k)));
             let column_parts =
-                column_parts.collect::<Result<Vec<_>, _>>().map_err(|_| not_numbers_error())?;
+                batch_columns.collect::<Result<Vec<_>, _>>().map_err(|_| not_numbers_error())?;
             columns.push(column_parts.concat().into());
         }
-        Ok(Self { names, columns, rows: batches.iter().map(RecordBatch::num_rows).sum() })
+        Ok(Self { names, columns, row_count: batches.iter().map(RecordBatch::num_rows).sum() })
     }
 
     /// Creates a table from named columns of equal length.
@@ -59,26 +60,31 @@ impl PointTable {
     /// # Errors
     /// Returns [`Diagnostics`] for a column of another length than the first.
     pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
-        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        let row_count = columns.first().map_or(0, |(_, values)| values.len());
         let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
-        if let Some(k) = columns.iter().position(|(_, values)| values.len() != rows) {
-            return Err(crate::config::wrong_length_mistake(&names, k, columns[k].1.len(), rows));
+        if let Some(k) = columns.iter().position(|(_, values)| values.len() != row_count) {
+            return Err(crate::config::wrong_length_mistake(
+                &names,
+                k,
+                columns[k].1.len(),
+                row_count,
+            ));
         }
         let columns = columns.into_iter().map(|(_, values)| values.into()).collect();
-        Ok(Self { names, columns, rows })
+        Ok(Self { names, columns, row_count })
     }
 
     /// Returns the number of points.
     pub fn rows(&self) -> usize {
-        self.rows
+        self.row_count
     }
 
     /// Returns the columns with their names; a missing value is NaN.
     pub(super) fn into_columns(self) -> Vec<(String, Vec<f64>)> {
-        let values = |column: &Float64Array| -> Vec<f64> {
+        let values_or_nan = |column: &Float64Array| -> Vec<f64> {
             column.iter().map(|value| value.unwrap_or(f64::NAN)).collect()
         };
-        self.names.iter().cloned().zip(self.columns.iter().map(values)).collect()
+        self.names.iter().cloned().zip(self.columns.iter().map(values_or_nan)).collect()
     }
 
     /// Assigns the columns to the axes of a plan.
@@ -92,7 +98,7 @@ impl PointTable {
     ) -> Result<PointsOnAxes<'a>, Diagnostics> {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
         let columns = check_columns(plan, &names, |column| self.columns[column].iter())?;
-        Ok(PointsOnAxes { table: self, plan, columns })
+        Ok(PointsOnAxes { table: self, plan, column_by_axis: columns })
     }
 }
 
@@ -101,7 +107,7 @@ pub(super) struct PointsOnAxes<'a> {
     table: &'a PointTable,
     plan: &'a Plan,
     /// The column of each axis; `None` for an axis with one value that the table omits.
-    columns: Vec<Option<usize>>,
+    column_by_axis: Vec<Option<usize>>,
 }
 
 impl PointsOnAxes<'_> {
@@ -109,17 +115,17 @@ impl PointsOnAxes<'_> {
     pub(super) fn axis_values(&self, point: u64) -> Vec<f64> {
         // The index of a row always fits into `usize`.
         let row = usize::try_from(point).unwrap_or(usize::MAX);
-        let value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
+        let axis_value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
             Some(column) => self.table.columns[*column].value(row),
             None => axis.values.value(0),
         };
-        self.plan.axes.iter().zip(&self.columns).map(value).collect()
+        self.plan.axes.iter().zip(&self.column_by_axis).map(axis_value).collect()
     }
 
     /// Returns the hexadecimal BLAKE3 hash of the values, row by row.
     pub(super) fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
-        for row in 0..self.table.rows as u64 {
+        for row in 0..self.table.row_count as u64 {
             for value in self.axis_values(row) {
                 hasher.update(&value.to_bits().to_le_bytes());
             }
@@ -138,9 +144,9 @@ mod tests {
 
     #[test]
     fn the_index_of_a_data_frame_is_no_column() {
-        let masses: ArrayRef = Arc::new(Float64Array::from(vec![0.3, 0.5]));
-        let index: ArrayRef = Arc::new(Int64Array::from(vec![7, 2]));
-        let columns = [("unbalance_mass_kg", masses), ("__index_level_0__", index)];
+        let mass_array: ArrayRef = Arc::new(Float64Array::from(vec![0.3, 0.5]));
+        let index_array: ArrayRef = Arc::new(Int64Array::from(vec![7, 2]));
+        let columns = [("unbalance_mass_kg", mass_array), ("__index_level_0__", index_array)];
         let batch = RecordBatch::try_from_iter(columns).expect("it is whole");
         let table = PointTable::new(&batch.schema(), &[batch]).expect("it holds numbers");
         assert_eq!(table.names, ["unbalance_mass_kg"]);

@@ -20,7 +20,7 @@ pub struct MemoryTable {
     plan: Value,
     schema: SchemaRef,
     batches: Vec<RecordBatch>,
-    file: FileContent,
+    file_content: FileContent,
 }
 
 /// The content of a result's file.
@@ -39,8 +39,8 @@ impl MemoryTable {
         let layout = Box::new(job.layout.clone());
         let kind = layout.kind;
         let schema = layout.schema();
-        let file = FileContent::Rows { points: job.points, layout, is_complete };
-        Self { kind, plan, schema, batches, file }
+        let file_content = FileContent::Rows { points: job.points, layout, is_complete };
+        Self { kind, plan, schema, batches, file_content }
     }
 
     /// Creates a table from a small result, which is a single batch.
@@ -53,7 +53,7 @@ impl MemoryTable {
             plan,
             schema: batch.schema(),
             batches: vec![batch],
-            file: FileContent::Bytes(bytes),
+            file_content: FileContent::Bytes(bytes),
         })
     }
 
@@ -74,8 +74,8 @@ impl MemoryTable {
         let all_columns = (0..file.schema().fields().len()).collect();
         let batches = file.batches(all_columns)?.collect::<Result<Vec<_>, _>>()?;
         let schema = SchemaRef::clone(file.schema());
-        let file = FileContent::Bytes(file.bytes()?);
-        Ok(Self { kind, plan, schema, batches, file })
+        let file_content = FileContent::Bytes(file.bytes()?);
+        Ok(Self { kind, plan, schema, batches, file_content })
     }
 
     /// Returns the kind of the result.
@@ -109,7 +109,7 @@ impl MemoryTable {
     /// Returns an error if the path has a file of another kind, if the file cannot be written, and
     /// if the evaluation was interrupted.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
-        let FileContent::Rows { points, layout, is_complete } = &self.file else {
+        let FileContent::Rows { points, layout, is_complete } = &self.file_content else {
             return self.finish(Output::begin(path, self.kind)?);
         };
         if !is_complete {
@@ -131,7 +131,7 @@ impl MemoryTable {
 
     /// Writes the bytes of a small result, or of a file that was read, to an output.
     pub(super) fn finish(&self, output: Output<'_>) -> Result<(), Error> {
-        match &self.file {
+        match &self.file_content {
             FileContent::Bytes(bytes) => Ok(output.finish(bytes)?),
             FileContent::Rows { .. } => Ok(()),
         }
@@ -143,8 +143,8 @@ impl MemoryTable {
     /// # Errors
     /// Returns the errors of [`sweep_plot::render`] and [`Self::save`].
     pub fn draw(&self, output: &Path) -> Result<(), Error> {
-        let description = Path::new("a temporary folder");
-        let folder = tempfile::tempdir().map_err(FileError::io("make", description))?;
+        let folder_description = Path::new("a temporary folder");
+        let folder = tempfile::tempdir().map_err(FileError::io("make", folder_description))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
         Ok(render(&path, &PlotOptions::default(), &WasherFigures::default(), output)?)

@@ -35,10 +35,10 @@ pub fn find_boundary(
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
     let task = BoundaryTask::new(plan, options)?;
-    let search = |trials| trace_boundary(&task, trials, execution);
+    let trace_with_trials = |trials| trace_boundary(&task, trials, execution);
     let search_output =
-        SearchOutput { job: &task.job(), columns: task.trial_columns(), output, fresh };
-    run_search(search_output, search, |boundary| task.table(boundary))
+        SearchOutput { job: &task.job(), trial_columns: task.trial_columns(), output, fresh };
+    run_search(search_output, trace_with_trials, |boundary| task.table(boundary))
 }
 
 /// Computes the candidates of a study file; `None` if the interrupt was raised. `sets` has
@@ -57,16 +57,16 @@ pub fn optimise_study(
     execution: Execution<'_>,
 ) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
-    let search = |trials| search(&study, trials, execution);
+    let search_with_trials = |trials| search(&study, trials, execution);
     let search_output =
-        SearchOutput { job: &study.job(), columns: trial_columns(&study), output, fresh };
-    run_search(search_output, search, |candidates| candidates_table(&study, candidates))
+        SearchOutput { job: &study.job(), trial_columns: trial_columns(&study), output, fresh };
+    run_search(search_output, search_with_trials, |candidates| candidates_table(&study, candidates))
 }
 
 /// The output of a search and the trials that are stored with it.
 struct SearchOutput<'a> {
     job: &'a Job<'a>,
-    columns: TrialColumns,
+    trial_columns: TrialColumns,
     output: Option<&'a Path>,
     fresh: bool,
 }
@@ -78,19 +78,19 @@ fn run_search<T>(
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
 ) -> Result<Option<MemoryTable>, Error> {
-    let SearchOutput { job, columns, output, fresh } = search_output;
+    let SearchOutput { job, trial_columns: columns, output, fresh } = search_output;
     let kind = job.layout.kind;
-    let file = output.map(|path| Output::begin(path, kind)).transpose()?;
-    let open = |path| Trials::open(path, job, columns, fresh);
-    let trials = match output.map(open).transpose()? {
+    let output_file = output.map(|path| Output::begin(path, kind)).transpose()?;
+    let open_trials = |path| Trials::open(path, job, columns, fresh);
+    let trials = match output.map(open_trials).transpose()? {
         Some(OpenOutcome::Finished(())) => return output.map(MemoryTable::read).transpose(),
         Some(OpenOutcome::Open(trials)) => Some(trials),
         None => None,
     };
-    let (result, trials) = search(trials)?;
-    let Some(result) = result else { return Ok(None) };
+    let (search_result, trials) = search(trials)?;
+    let Some(result) = search_result else { return Ok(None) };
     let table = MemoryTable::from_table(kind, table(&result))?;
-    if let Some(file) = file {
+    if let Some(file) = output_file {
         table.finish(file)?;
     }
     // The result is complete, so that a folder of trials that cannot be removed is not an error.

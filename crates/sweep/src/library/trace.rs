@@ -50,24 +50,30 @@ pub fn trace_point(
         }
     };
     let every_s = check_spacing(options.every_s, &plan)?;
-    let start = options.start.iter().map(|text| {
+    let start_values = options.start.iter().map(|text| {
         parse_start_value(text).map_err(|expected| {
             Error::option("start", text, expected.trim_start_matches("expected "))
         })
     });
-    let start = start_from(&start.collect::<Result<Vec<_>, _>>()?);
+    let initial_deviation = start_from(&start_values.collect::<Result<Vec<_>, _>>()?);
     let models = match options.model.as_deref() {
         None => Models::Both,
         Some(name) => Models::from_str(name, false)
             .map_err(|_| Error::option("model", name, "nonlinear, linear or both"))?,
     };
-    let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
+    let settings = TraceSettings {
+        every_s,
+        models,
+        start: initial_deviation,
+        extras: options.extras,
+        capped: None,
+    };
     let cancel = Cancel::Flag(interrupt.flag());
-    let trace = trace_in_pool(&plan, parameters, &settings, cancel).map_err(Error::model)?;
+    let trace_table = trace_in_pool(&plan, parameters, &settings, cancel).map_err(Error::model)?;
     if interrupt.is_raised() {
         return Ok(None);
     }
-    Ok(Some((MemoryTable::from_table(FileKind::Trace, trace.table)?, trace.failures)))
+    Ok(Some((MemoryTable::from_table(FileKind::Trace, trace_table.table)?, trace_table.failures)))
 }
 
 #[cfg(test)]
@@ -78,14 +84,14 @@ mod tests {
     #[test]
     fn an_interrupt_ends_a_trace_and_modes() {
         // Each of the two functions would take hours.
-        let text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
+        let grid_text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
              time = { end_s = 1e5 }\nintegrator = { method = \"rk4\", step_s = 1e-5 }\n";
-        let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
-        let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
+        let grid = WasherGridInput::text("grid", grid_text.to_owned(), Vec::new());
+        let speeds_rpm: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         interrupt.raise(2);
         let options = TraceOptions { every_s: Some(1.0), ..TraceOptions::default() };
         assert!(trace_point(&grid, &[], &options, &interrupt).unwrap().is_none());
-        assert!(find_modes(Some(&grid), &[], &speeds, &interrupt).unwrap().is_none());
+        assert!(find_modes(Some(&grid), &[], &speeds_rpm, &interrupt).unwrap().is_none());
     }
 }

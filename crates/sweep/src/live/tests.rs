@@ -16,18 +16,20 @@ parameter = "damping_n_s_per_m"
 values = [60, 180, 300]
 "#;
 
-fn plan(text: &str) -> Plan {
+fn load_plan(text: &str) -> Plan {
     WasherGridInput::text("live", text.to_owned(), Vec::new()).load().unwrap()
 }
 
 /// Asserts that a checked point of a page is a row of the program.
-fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
-    let checked = washer_live::check_point(setup, values).unwrap();
-    let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
+fn assert_point_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
+    let checked_point = washer_live::check_point(setup, values).unwrap();
+    let errors = checked_point.errors[0].zip(checked_point.errors[1]).map(|(a, b)| a.max(b));
     assert_eq!(errors, outcome.error, "{values:?}");
-    assert_eq!(checked.method_kinds[0], outcome.method, "{values:?}");
-    assert_eq!((checked.outcome, values), (Outcome { point: 0, ..outcome.clone() }, values));
-    for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
+    assert_eq!(checked_point.method_kinds[0], outcome.method, "{values:?}");
+    assert_eq!((checked_point.outcome, values), (Outcome { point: 0, ..outcome.clone() }, values));
+    for (amplitudes, run) in
+        checked_point.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear])
+    {
         let channels = setup.rule.channels.iter();
         let amplitudes: Vec<f64> = channels.map(|channel| amplitudes[channel.index()]).collect();
         if run.status == Status::Ok {
@@ -38,28 +40,28 @@ fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
 
 #[test]
 fn a_checked_point_is_the_row_of_the_map() {
-    let plan = plan(GRID);
+    let plan = load_plan(GRID);
     let (setup, _) = build_setup(&plan, &usual_sliders(&plan)).unwrap();
-    // A page has the setup that its numbers give back.
+    // A page reads its setup from numbers, so the test does, too.
     let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
     let engine = ModelEngine::new(&plan).unwrap();
     // The first point converges at once, the second late, and the third is chaotic.
     for values in [[0.1, 300.0], [0.4, 180.0], [0.95, 180.0]] {
         let outcomes = engine.outcomes_at(&[values.to_vec()]);
-        assert_is_row(&outcomes[0], &setup, &values);
+        assert_point_is_row(&outcomes[0], &setup, &values);
     }
 }
 
 #[test]
 fn every_criterion_and_metric_is_the_rows() {
-    let further = r#"
+    let further_keys = r#"
 metrics = ["static_sag", "cabinet_force", "clash_time", "growth"]
 reliability = { criterion = "CRITERION" }
 stability = { speed_rpm = "200:240:20" }
 "#;
     for criterion in ["rms", "envelope"] {
-        let further = further.replace("CRITERION", criterion);
-        let mut plan = plan(&(further + GRID));
+        let further_keys_of_criterion = further_keys.replace("CRITERION", criterion);
+        let mut plan = load_plan(&(further_keys_of_criterion + GRID));
         assert_eq!(take_held_metrics(&mut plan), (vec![200.0, 220.0, 240.0], vec![Metric::Growth]));
         let (setup, _) = build_setup(&plan, &[]).unwrap();
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
@@ -68,21 +70,22 @@ stability = { speed_rpm = "200:240:20" }
         let outcome = &engine.outcomes_at(&[values.to_vec()])[0];
         assert_eq!(outcome.linear.metrics.len(), 2);
         assert!(outcome.static_sag_m > Some(0.0));
-        assert_is_row(outcome, &setup, &values);
-        let answer = washer_live::check_point(&setup, &values).unwrap();
+        assert_point_is_row(outcome, &setup, &values);
+        let checked_point = washer_live::check_point(&setup, &values).unwrap();
         let verdict = &outcome.verdict;
         // The page has the ratios by turn of every channel.
-        let turn_ratios = answer.outcome.turn_ratios;
+        let turn_ratios = checked_point.outcome.turn_ratios;
         assert!(criterion == "rms" || turn_ratios == verdict.ratios);
-        let ratios = setup.rule.channels.iter().map(|channel| answer.ratios[channel.index()]);
+        let ratios =
+            setup.rule.channels.iter().map(|channel| checked_point.ratios[channel.index()]);
         assert_eq!(ratios.collect::<Vec<_>>(), verdict.ratios, "{criterion}");
     }
 }
 
 #[test]
 fn motions_of_held_speeds_are_the_rows() {
-    let further = "metrics = [\"dwell\"]\nstability = { speed_rpm = \"240,250\" }\n";
-    let mut plan = plan(&(further.to_owned() + GRID));
+    let further_keys = "metrics = [\"dwell\"]\nstability = { speed_rpm = \"240,250\" }\n";
+    let mut plan = load_plan(&(further_keys.to_owned() + GRID));
     let values = [0.4, 140.0];
     let outcome = &ModelEngine::new(&plan).unwrap().outcomes_at(&[values.to_vec()])[0];
     let (speeds_rpm, metrics) = take_held_metrics(&mut plan);
@@ -97,23 +100,23 @@ fn motions_of_held_speeds_are_the_rows() {
 
 #[test]
 fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
-    let plan = plan(GRID);
+    let plan = load_plan(GRID);
     let sliders =
         requested_sliders(&plan, &[parse_slider_range("tub_mass_kg=20:28").unwrap()]).unwrap();
     let (setup, _) = build_setup(&plan, &sliders).unwrap();
-    let wide_plan = with_sliders(&plan, &sliders);
+    let wide_plan = plan_with_sliders(&plan, &sliders);
     let engine = ModelEngine::new(&wide_plan).unwrap();
     let values = [0.4, 240.0, 26.0];
-    assert_is_row(&engine.outcomes_at(&[values.to_vec()])[0], &setup, &values);
+    assert_point_is_row(&engine.outcomes_at(&[values.to_vec()])[0], &setup, &values);
 }
 
 #[test]
 fn a_setup_comes_back_from_its_numbers() {
-    let mut plan = plan(&GRID.replace(
+    let mut plan = load_plan(&GRID.replace(
         "\"triangular\", peak_rpm = 350, ramp_s = 50",
         "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
     ));
-    plan.model.machine = crate::config::machine::with_one_of_each();
+    plan.model.machine = crate::config::machine::machine_with_every_element();
     (plan.model.measures.stops, plan.model.measures.feet) =
         (plan.model.machine.stops.len(), plan.model.machine.feet.len());
     plan.model.measures.metrics = vec![Metric::SlipMargin, Metric::CabinetForce];
@@ -134,7 +137,7 @@ fn a_setup_comes_back_from_its_numbers() {
 
 #[test]
 fn sliders_that_cannot_be_are_refused() {
-    let plan = plan(GRID);
+    let plan = load_plan(GRID);
     for (text, expected) in [
         ("tub_mas_kg=1:2", "no parameter has this name"),
         ("damping_n_s_per_m=1:2", "no slider yet"),

@@ -10,7 +10,7 @@ use washer_model::{
 use crate::plan::{point_input, prepare_point, timing};
 
 /// Returns the last point of a grid in `tests/held`.
-fn point(name: &str) -> Point {
+fn last_point_of_grid(name: &str) -> Point {
     let path = format!("{}/tests/held/g_{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let plan = crate::config::load(path.as_ref(), &[]).unwrap();
     let input = point_input(&plan, &plan.axis_values(plan.points() - 1));
@@ -30,7 +30,7 @@ fn find_responses_at(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
 fn a_textbook_machine_has_a_response_at_every_speed() {
     let speeds_rpm = [452.0, 500.0, 532.0, 660.0, 700.0];
     for (responses, rpm) in
-        find_responses_at(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm)
+        find_responses_at(&last_point_of_grid("textbook"), &speeds_rpm).iter().zip(speeds_rpm)
     {
         assert!(!responses.is_empty(), "{rpm} rpm");
     }
@@ -40,7 +40,8 @@ fn a_textbook_machine_has_a_response_at_every_speed() {
 #[test]
 fn all_branches_of_a_folded_curve_are_found() {
     let speeds_rpm: Vec<f64> = (0..25).map(|k| 144.2 + 0.05 * f64::from(k)).collect();
-    for (responses, rpm) in find_responses_at(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm)
+    for (responses, rpm) in
+        find_responses_at(&last_point_of_grid("fine17"), &speeds_rpm).iter().zip(&speeds_rpm)
     {
         let branches: Vec<u32> = responses.iter().map(|response| response.branch).collect();
         assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
@@ -51,19 +52,19 @@ fn all_branches_of_a_folded_curve_are_found() {
 /// 5e-5 s, and 7.767 mm with capped modes.
 #[test]
 fn a_response_with_friction_is_found_without_caps() {
-    let responses = find_responses_at(&point("72001_10"), &[264.61]);
-    let drum_m = responses[0][0].nonlinear_peaks[Channel::DrumFrontZ.index()];
-    assert!((drum_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_m}");
+    let responses = find_responses_at(&last_point_of_grid("72001_10"), &[264.61]);
+    let drum_amplitude_m = responses[0][0].nonlinear_peaks[Channel::DrumFrontZ.index()];
+    assert!((drum_amplitude_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_amplitude_m}");
 }
 
 /// At this speed a motion that repeats every second turn has a multiplier of -1.092, so it is
 /// unstable. Trajectories leave it for a motion that repeats every fourth turn.
 #[test]
 fn a_saddle_is_no_attractor() {
-    let point = point("74002_13");
+    let point = last_point_of_grid("74002_13");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 414.0 }];
-    let starts = StartRule { start_count: 1, ..StartRule::default() };
-    let result = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never)
+    let start_rule = StartRule { start_count: 1, ..StartRule::default() };
+    let result = find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never)
         .remove(0)
         .unwrap();
     let motion = &result.attractors[0];
@@ -76,11 +77,11 @@ fn a_saddle_is_no_attractor() {
 #[test]
 #[ignore = "half a minute"]
 fn chaos_that_does_not_last_is_a_transient() {
-    let point = point("74001_8");
+    let point = last_point_of_grid("74001_8");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 306.0 }];
-    let result =
+    let results =
         find_attractors(Simd::widest(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
-    let result = result.into_iter().next().unwrap().unwrap();
+    let result = results.into_iter().next().unwrap().unwrap();
     assert!(result.attractors.iter().all(|motion| motion.motion_kind != Some(MotionKind::Chaotic)));
     let is_transient =
         |state| matches!(state, AttractorStatus::Transient { life_s } if life_s > 0.0);
@@ -93,7 +94,7 @@ fn chaos_that_does_not_last_is_a_transient() {
 #[test]
 #[ignore = "half a minute"]
 fn an_attractor_far_from_the_response_is_found_from_rest() {
-    let point = point("74001_11");
+    let point = last_point_of_grid("74001_11");
     let held_speeds = [HeldSpeed { point: &point, speed_rpm: 404.1 }];
     let result =
         find_attractors(Simd::widest(), &held_speeds, &[], &StartRule::default(), Cancel::Never);
@@ -112,20 +113,20 @@ fn an_attractor_far_from_the_response_is_found_from_rest() {
 /// where that response is hard to find.
 #[test]
 fn a_textbook_machine_ends_in_its_response() {
-    let point = point("textbook");
+    let point = last_point_of_grid("textbook");
     let speeds_rpm = [500.0, 700.0];
     let held_speeds: Vec<HeldSpeed<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| HeldSpeed { point: &point, speed_rpm }).collect();
-    let starts = StartRule { start_count: 3, ..StartRule::default() };
-    let results = find_attractors(Simd::widest(), &held_speeds, &[], &starts, Cancel::Never);
+    let start_rule = StartRule { start_count: 3, ..StartRule::default() };
+    let results = find_attractors(Simd::widest(), &held_speeds, &[], &start_rule, Cancel::Never);
     for (result, rpm) in results.into_iter().zip(speeds_rpm) {
         let result = result.unwrap();
         let motion = &result.attractors[0];
         assert_eq!(motion.motion_kind, Some(MotionKind::Periodic { turns: 1 }), "{rpm} rpm");
-        let yaw = Channel::TubYaw.index();
-        let yaws_rad = result.responses.iter().map(|response| response.nonlinear_peaks[yaw]);
+        let yaw_index = Channel::TubYaw.index();
+        let yaws_rad = result.responses.iter().map(|response| response.nonlinear_peaks[yaw_index]);
         let least_difference = yaws_rad
-            .map(|yaw_rad| (yaw_rad / motion.peaks[yaw] - 1.0).abs())
+            .map(|yaw_rad| (yaw_rad / motion.peaks[yaw_index] - 1.0).abs())
             .fold(f64::INFINITY, f64::min);
         assert!(least_difference < 1e-3, "{rpm} rpm: {least_difference}");
     }

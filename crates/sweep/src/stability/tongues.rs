@@ -66,8 +66,8 @@ pub(crate) struct StabilitySummary {
 impl StabilitySummary {
     /// Adds the next row of the file.
     pub(crate) fn add(&mut self, row: StabilityRow) {
-        let same_point = self.last_row.as_ref().is_some_and(|last| last.point == row.point);
-        let is_coexisting = |last: &StabilityRow| same_point && last.speed_rpm == row.speed_rpm;
+        let is_same_point = self.last_row.as_ref().is_some_and(|last| last.point == row.point);
+        let is_coexisting = |last: &StabilityRow| is_same_point && last.speed_rpm == row.speed_rpm;
         // A machine that runs up is on the branch of the first row at a speed.
         if self.last_row.as_ref().is_some_and(is_coexisting) {
             self.coexisting_rows += 1;
@@ -75,23 +75,25 @@ impl StabilitySummary {
         }
         self.rows += 1;
         self.greatest_speed_rpm = self.greatest_speed_rpm.max(row.speed_rpm);
-        let branch_end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
+        let point_and_branch_end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
         let has_end = row.branch_to_rpm.is_some() && !row.is_off_curve;
-        if has_end && self.jumps.last().map(branch_end) != Some(branch_end(&row)) {
+        if has_end
+            && self.jumps.last().map(point_and_branch_end) != Some(point_and_branch_end(&row))
+        {
             self.jumps.push(row.clone());
         }
         let continues_tongue =
-            same_point && self.last_row.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
-        self.points += u64::from(!same_point);
+            is_same_point && self.last_row.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
+        self.points += u64::from(!is_same_point);
         self.rows_without_response += u64::from(row.status != "ok");
         self.rows_off_curve += u64::from(row.is_off_curve);
         self.rows_beyond_limits += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
-        let is_passed = |tongue: &UnstableRange| {
+        let is_passed_before = |tongue: &UnstableRange| {
             tongue.largest_growth_row.point == row.point && tongue.end_speeds_rpm[1] < row.speed_rpm
         };
         let is_stable = row.growth_per_s <= 0.0 && row.beyond.is_none();
         self.rows_above_tongue +=
-            u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
+            u64::from(is_stable && self.tongues.last().is_some_and(is_passed_before));
         if row.growth_per_s > 0.0 {
             self.unstable_rows += 1;
             match self.tongues.last_mut() {
@@ -162,13 +164,13 @@ impl StabilitySummary {
         }
         // The tongues of a single point are listed in order of speed, those of several points by
         // growth.
-        let mut listed: Vec<&UnstableRange> = self.tongues.iter().collect();
+        let mut listed_tongues: Vec<&UnstableRange> = self.tongues.iter().collect();
         if self.points > 1 {
-            listed.sort_by(|a, b| {
+            listed_tongues.sort_by(|a, b| {
                 b.largest_growth_row.growth_per_s.total_cmp(&a.largest_growth_row.growth_per_s)
             });
         }
-        lines.extend(listed.iter().map(|tongue| ("unstable", self.format_tongue(tongue))));
+        lines.extend(listed_tongues.iter().map(|tongue| ("unstable", self.format_tongue(tongue))));
         lines
     }
 
@@ -184,13 +186,15 @@ impl StabilitySummary {
         let UnstableRange { largest_growth_row: row, end_speeds_rpm: [first_rpm, last_rpm] } =
             tongue;
         let mut text = self.point_prefix(row);
-        let [speed, first, last] = [row.speed_rpm, *first_rpm, *last_rpm].map(format_number);
-        let range_end = if first == last { String::new() } else { format!(" to {last}") };
+        let [growth_speed_text, first_text, last_text] =
+            [row.speed_rpm, *first_rpm, *last_rpm].map(format_number);
+        let range_end_text =
+            if first_text == last_text { String::new() } else { format!(" to {last_text}") };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "{first}{range_end} rpm, {}, up to {:.4} /s at {speed} rpm ({:.1} and {:.1} per \
-             minute)",
+            "{first_text}{range_end_text} rpm, {}, up to {:.4} /s at {growth_speed_text} rpm \
+             ({:.1} and {:.1} per minute)",
             row.kind.replace('_', " "),
             row.growth_per_s,
             row.frequency_cpm,
@@ -209,22 +213,25 @@ impl StabilitySummary {
 /// Returns an error if the file cannot be read.
 pub(crate) fn summarise(file: &ParquetFile) -> Result<StabilitySummary, FileError> {
     let axes = places::axis_names(file);
-    let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
-    let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
-    let words = ["kind", "status", "beyond", "on_curve"];
-    let fixed_names = [&numbers[..], &modes, &words].concat();
-    let names = [&fixed_names[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
+    let number_columns = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
+    let mode_columns = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
+    let word_columns = ["kind", "status", "beyond", "on_curve"];
+    let fixed_columns = [&number_columns[..], &mode_columns, &word_columns].concat();
+    let column_names =
+        [&fixed_columns[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
     let mut summary = StabilitySummary { axes: axes.clone(), ..StabilitySummary::default() };
-    file.each_row(&names, |row| {
+    file.each_row(&column_names, |row| {
         let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
             std::array::from_fn(|column| row.value(column));
         let [kind, status, beyond] = [9, 10, 11].map(|column| row.word(column).map(str::to_owned));
         let is_off_curve = row.word(12) == Some("false");
         let modes = [5, 6].map(|column| (row.value(column), row.word(column + 2)));
-        let modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
+        let participating_modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
         summary.add(StabilityRow {
             point,
-            axis_values: (fixed_names.len()..names.len()).map(|column| row.value(column)).collect(),
+            axis_values: (fixed_columns.len()..column_names.len())
+                .map(|column| row.value(column))
+                .collect(),
             speed_rpm,
             growth_per_s,
             frequency_cpm,
@@ -232,7 +239,7 @@ pub(crate) fn summarise(file: &ParquetFile) -> Result<StabilitySummary, FileErro
             branch_to_rpm: Some(branch_to_rpm).filter(|speed| !speed.is_nan()),
             beyond,
             is_off_curve,
-            modes: modes
+            modes: participating_modes
                 .map(|(number, name)| (number, name.unwrap_or_default().to_owned()))
                 .collect(),
             status: status.unwrap_or_default(),
@@ -248,8 +255,8 @@ mod tests {
 
     #[test]
     fn tongues_are_ranges_of_one_point_and_kind() {
-        let axes = vec!["unbalance_mass_kg".to_owned()];
-        let mut summary = StabilitySummary { axes, ..StabilitySummary::default() };
+        let axis_names = vec!["unbalance_mass_kg".to_owned()];
+        let mut summary = StabilitySummary { axes: axis_names, ..StabilitySummary::default() };
         let rows = [
             (0.0, 1.0, -0.1, "stable"),
             (0.0, 2.0, 0.1, "quasi_periodic"),
@@ -275,19 +282,19 @@ mod tests {
                 ..StabilityRow::default()
             });
         }
-        let tongue_speeds: Vec<_> = summary
+        let tongue_speeds_rpm: Vec<_> = summary
             .tongues
             .iter()
             .map(|t| (t.end_speeds_rpm, t.largest_growth_row.speed_rpm))
             .collect();
         assert_eq!(
-            tongue_speeds,
+            tongue_speeds_rpm,
             [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
         );
         let lines = summary.lines();
-        let counts =
+        let expected_counts =
             "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
-        assert!(lines[0].1.starts_with(counts), "{lines:?}");
+        assert!(lines[0].1.starts_with(expected_counts), "{lines:?}");
         assert!(lines[1].1.starts_with("2 rows off the curve"));
         assert!(lines[2].1.starts_with("1 further row: other responses"));
         assert!(lines[3].1.starts_with(
@@ -337,7 +344,7 @@ mod tests {
         for speed_rpm in [0.1 + 0.2, 249.700_000_000_000_02] {
             summary.add(StabilityRow { speed_rpm, growth_per_s: 1.0, ..StabilityRow::default() });
         }
-        let (_, tongue) = summary.lines().pop().unwrap();
-        assert!(tongue.starts_with("0.3 to 249.7 rpm"), "{tongue}");
+        let (_, tongue_text) = summary.lines().pop().unwrap();
+        assert!(tongue_text.starts_with("0.3 to 249.7 rpm"), "{tongue_text}");
     }
 }

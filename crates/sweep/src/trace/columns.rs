@@ -11,7 +11,7 @@ use super::{TraceExtras, TraceRun};
 /// Distance from a whole turn (rad) below which an angle is reported as 0. Basis: some ten times
 /// the rounding error of the angle after the most turns that a run can have. Doubling it changes
 /// no angle that is sampled between whole turns.
-const WHOLE_TURN_RAD: f64 = 1e-7;
+const WHOLE_TURN_TOLERANCE_RAD: f64 = 1e-7;
 
 /// Adds the columns of histories, in which the runs stand one below the other. Returns for each
 /// model and each run why the integration failed, if it did.
@@ -28,15 +28,15 @@ pub(super) fn add_columns(
     if extras.angle {
         let angles = runs.iter().flat_map(|run| run.spin.angles_rad(run.times_s.iter().copied()));
         // Instants of whole turns are rounded, so their angles may be just below 2 pi.
-        let is_whole = |angle: f64| angle.min(TAU - angle) < WHOLE_TURN_RAD;
-        let angles = angles.map(|angle| if is_whole(angle) { 0.0 } else { angle });
+        let is_whole_turn = |angle: f64| angle.min(TAU - angle) < WHOLE_TURN_TOLERANCE_RAD;
+        let rounded_angles = angles.map(|angle| if is_whole_turn(angle) { 0.0 } else { angle });
         let description = "angle of the drum, 0 where the unbalance is up";
-        table.add_numbers("drum_angle_rad", "rad", description, angles.map(Some));
+        table.add_numbers("drum_angle_rad", "rad", description, rounded_angles.map(Some));
     }
-    let counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
+    let instant_counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
     let models: Vec<ModelColumns<'_>> = models
         .iter()
-        .map(|(kind, histories)| ModelColumns::new(kind.name(), histories, &counts))
+        .map(|(kind, histories)| ModelColumns::new(kind.name(), histories, &instant_counts))
         .collect();
     models.iter().for_each(|model| model.add_channels(table));
     models.iter().for_each(|model| model.add_gap(table));
@@ -75,10 +75,10 @@ impl<'a> ModelColumns<'a> {
         &self,
         table: &mut Table,
         (name, unit, description): (&str, &str, &str),
-        quantity: impl Fn(&InstantOutputs) -> f64,
+        quantity_of: impl Fn(&InstantOutputs) -> f64,
     ) {
         let description = format!("{description}, {} model; null from where it failed", self.model);
-        let values = self.instants.iter().map(|instant| instant.as_ref().map(&quantity));
+        let values = self.instants.iter().map(|instant| instant.as_ref().map(&quantity_of));
         table.add_numbers(name, unit, &description, values);
     }
 
@@ -94,20 +94,25 @@ impl<'a> ModelColumns<'a> {
 
     fn add_rates(&self, table: &mut Table) {
         for channel in Channel::ALL {
-            let name = channel.name();
+            let channel_name = channel.name();
             let unit = channel.unit();
-            let k = channel.index();
-            let name = |per: &str| format!("{}_{name}_{unit}_per_{per}", self.model);
+            let channel_index = channel.index();
+            let column_name =
+                |time_unit: &str| format!("{}_{channel_name}_{unit}_per_{time_unit}", self.model);
             let description = channel.description();
-            let rate = format!("rate of the {description}");
-            self.add_column(table, (&name("s"), &format!("{unit}/s"), &rate), |instant| {
-                instant.rates[k]
-            });
-            let acceleration = format!("acceleration of the {description}");
+            let rate_description = format!("rate of the {description}");
+            self.add_column(
+                table,
+                (&column_name("s"), &format!("{unit}/s"), &rate_description),
+                |instant| instant.rates[channel_index],
+            );
+            let acceleration_description = format!("acceleration of the {description}");
             let unit = format!("{unit}/s^2");
-            self.add_column(table, (&name("s2"), &unit, &acceleration), |instant| {
-                instant.accelerations[k]
-            });
+            self.add_column(
+                table,
+                (&column_name("s2"), &unit, &acceleration_description),
+                |instant| instant.accelerations[channel_index],
+            );
         }
     }
 
@@ -136,71 +141,79 @@ impl<'a> ModelColumns<'a> {
             .zip(self.counts)
             .flat_map(|(history, &count)| (0..count).map(|k| history.forces(k)))
             .collect();
-        let mut add = |force: &str, description: &str, value: &dyn Fn(&SuspensionForces) -> f64| {
-            let name = format!("{force}_{}_n", self.model);
-            let description =
-                format!("{description}, {} model; null from where it failed", self.model);
-            table.add_numbers(
-                &name,
-                "N",
-                &description,
-                forces.iter().map(|forces| forces.as_ref().map(value)),
-            );
-        };
-        let Some(first) = forces.first().and_then(Option::as_ref) else { return };
-        let axes = ["x", "y", "z"];
+        let mut add_force =
+            |force: &str, description: &str, value: &dyn Fn(&SuspensionForces) -> f64| {
+                let name = format!("{force}_{}_n", self.model);
+                let description =
+                    format!("{description}, {} model; null from where it failed", self.model);
+                table.add_numbers(
+                    &name,
+                    "N",
+                    &description,
+                    forces.iter().map(|forces| forces.as_ref().map(value)),
+                );
+            };
+        let Some(first_forces) = forces.first().and_then(Option::as_ref) else { return };
+        let axis_letters = ["x", "y", "z"];
         for (kind, (element, force, description, components)) in
             SuspensionForces::ELEMENT_KINDS.into_iter().enumerate()
         {
-            for k in 0..first.by_kind()[kind].len() {
+            for k in 0..first_forces.by_kind()[kind].len() {
                 let mut name = format!("{element}_{}_{force}", k / components + 1);
                 let mut description = description.to_owned();
                 if components > 1 {
-                    name += &format!("_{}", axes[k % components]);
+                    name += &format!("_{}", axis_letters[k % components]);
                     description += &(k % components + 1).to_string();
                 }
-                add(&name, &description, &|forces| forces.by_kind()[kind][k]);
+                add_force(&name, &description, &|forces| forces.by_kind()[kind][k]);
             }
         }
-        let elements = if first.stop_forces_n.is_empty() && first.bushing_forces_n.is_empty() {
-            "all springs and dampers"
-        } else {
-            "all springs, dampers, stops and bushings"
-        };
-        for (k, axis) in axes.into_iter().enumerate() {
-            let description = format!("force of {elements} on the cabinet along c{}", k + 1);
-            add(&format!("cabinet_force_{axis}"), &description, &|forces| {
+        let element_kinds =
+            if first_forces.stop_forces_n.is_empty() && first_forces.bushing_forces_n.is_empty() {
+                "all springs and dampers"
+            } else {
+                "all springs, dampers, stops and bushings"
+            };
+        for (k, axis) in axis_letters.into_iter().enumerate() {
+            let description = format!("force of {element_kinds} on the cabinet along c{}", k + 1);
+            add_force(&format!("cabinet_force_{axis}"), &description, &|forces| {
                 forces.cabinet_force_n[k]
             });
         }
-        for k in 0..first.foot_loads_n.len() {
+        for k in 0..first_forces.foot_loads_n.len() {
             let description = "vertical load of the foot, negative where it would lift";
-            add(&format!("foot_{}_load", k + 1), description, &|forces| forces.foot_loads_n[k]);
+            add_force(&format!("foot_{}_load", k + 1), description, &|forces| {
+                forces.foot_loads_n[k]
+            });
         }
-        if first.slip_margin_n.is_some() {
+        if first_forces.slip_margin_n.is_some() {
             let description = "margin of the cabinet against slipping, friction on all feet \
                                together less the horizontal force";
-            add("slip_margin", description, &|forces| forces.slip_margin_n.unwrap_or(f64::NAN));
+            add_force("slip_margin", description, &|forces| {
+                forces.slip_margin_n.unwrap_or(f64::NAN)
+            });
             let description = "margin of the cabinet against walking: that against slipping less \
                                what turning takes of it";
-            add("walk_margin", description, &|forces| forces.walk_margin_n.unwrap_or(f64::NAN));
+            add_force("walk_margin", description, &|forces| {
+                forces.walk_margin_n.unwrap_or(f64::NAN)
+            });
         }
     }
 
     /// Returns the reason and the time of each history's failure, if it failed.
     fn failures(&self) -> Vec<Option<String>> {
-        let failure = |history: &History<'_>| {
+        let failure_text = |history: &History<'_>| {
             let (reason, time_s) = history.failure?;
-            let failure = match reason {
+            let failure_words = match reason {
                 Failure::Diverged => "diverged",
                 Failure::StepTooSmall => "needs steps too small for double precision",
                 Failure::StepLimit => "used up its allowance of steps",
             };
             Some(format!(
-                "the {} model {failure} at {time_s:.4} s: its columns are null from there on",
+                "the {} model {failure_words} at {time_s:.4} s: its columns are null from there on",
                 self.model
             ))
         };
-        self.histories.iter().map(failure).collect()
+        self.histories.iter().map(failure_text).collect()
     }
 }

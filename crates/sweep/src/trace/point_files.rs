@@ -19,7 +19,7 @@ pub(crate) const MAX_POINT_TRACES: u64 = 10_000;
 
 /// Number of time steps in each file, over the whole run. Basis: the width in pixels of the chart
 /// that shows it. Doubling it doubles the size of the files.
-const STEPS_PER_FILE: f64 = 2000.0;
+const INTERVALS_PER_FILE: f64 = 2000.0;
 
 /// Writes the trace of every point of `result` into `folder` as `point-<index>.parquet`, until
 /// `cancel` is requested. A point without equilibrium gets no file. `on_point` is called after each
@@ -42,31 +42,31 @@ pub(crate) fn write_point_traces(
     let plan = engine.plan();
     files::create_folder_without_leftovers(folder)?;
     remove_point_traces(folder)?;
-    let methods = read::read_methods(result)?;
+    let method_names = read::read_methods(result)?;
     threads::build_pool(threads)?.install(|| {
-        methods.into_par_iter().enumerate().try_for_each(|(point, method)| {
+        method_names.into_par_iter().enumerate().try_for_each(|(point, method)| {
             let point = point as u64;
             if cancel.is_requested() {
                 return Ok(());
             }
             let names = plan.axes.iter().map(|axis| axis.parameter.name.to_string());
             let parameters = names.zip(plan.axis_values(point)).collect();
-            let kind = method.and_then(|name| MethodKind::named(&name));
+            let method_kind = method.and_then(|name| MethodKind::named(&name));
             let settings = TraceSettings {
-                every_s: Some(plan.end_s / STEPS_PER_FILE),
+                every_s: Some(plan.end_s / INTERVALS_PER_FILE),
                 models: Models::Both,
                 start: InitialDeviation::default(),
                 extras: TraceExtras::default(),
-                capped: kind.and_then(|kind| engine.capped_run(kind)),
+                capped: method_kind.and_then(|method_kind| engine.capped_run(method_kind)),
             };
-            let trace = trace_one_point(plan, point, parameters, &settings, cancel);
+            let trace_result = trace_one_point(plan, point, parameters, &settings, cancel);
             if cancel.is_requested() {
                 return Ok(());
             }
             // A point without equilibrium is an error here; its row in the map reports that.
-            if let Ok(trace) = trace {
+            if let Ok(trace_result) = trace_result {
                 let path = folder.join(format!("point-{point}.parquet"));
-                files::write(&path, FileKind::Trace, &trace.table.into_bytes(&path)?)?;
+                files::write(&path, FileKind::Trace, &trace_result.table.into_bytes(&path)?)?;
             }
             on_point();
             Ok(())
@@ -78,8 +78,9 @@ pub(crate) fn write_point_traces(
 fn remove_point_traces(folder: &Path) -> Result<(), StoreError> {
     for name in regular::file_names(folder).map_err(StoreError::io("list", folder))? {
         let is_point_trace = name.to_str().is_some_and(|name| {
-            let number = name.strip_prefix("point-").and_then(|rest| rest.strip_suffix(".parquet"));
-            number.is_some_and(|number| number.parse::<u64>().is_ok())
+            let point_number =
+                name.strip_prefix("point-").and_then(|rest| rest.strip_suffix(".parquet"));
+            point_number.is_some_and(|point_number| point_number.parse::<u64>().is_ok())
         });
         let path = folder.join(&name);
         if is_point_trace

@@ -22,9 +22,9 @@ fn start_values_are_of_coordinates_and_speeds() {
 }
 
 /// Returns the greatest magnitude of a column from an instant on.
-fn peak(rows: &RecordBatch, column: &str, from: usize) -> f64 {
+fn column_peak(rows: &RecordBatch, column: &str, first_row: usize) -> f64 {
     let values = rows.column_by_name(column).unwrap().as_primitive::<Float64Type>();
-    values.values()[from..].iter().fold(0.0, |peak, value| value.abs().max(peak))
+    values.values()[first_row..].iter().fold(0.0, |peak, value| value.abs().max(peak))
 }
 
 /// A fixed step of 2e-4 s misses the corners of friction, with errors of 1 % of a foot's load.
@@ -37,7 +37,7 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
          [spin]\nprofile = \"table\"\ntime_s = [0, 3, 3.2, 3.25]\n\
          speed_rpm = [0, 1400, 0, 0]\n";
     let path = folder.path().join("grid.toml");
-    let loads = |integrator: &str| {
+    let foot_loads_and_method = |integrator: &str| {
         std::fs::write(&path, format!("{grid}{integrator}")).unwrap();
         let plan = crate::config::load(&path, &[]).unwrap();
         let extras = TraceExtras { forces: true, ..TraceExtras::default() };
@@ -49,14 +49,15 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
             capped: None,
         };
         let trace = trace_one_point(&plan, 0, Vec::new(), &settings, Cancel::Never).unwrap();
-        let rows = trace.table.finish().unwrap().0;
-        let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
-        (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), trace.method)
+        let trace_rows = trace.table.finish().unwrap().0;
+        let load_column = trace_rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
+        (load_column.as_primitive::<Float64Type>().values()[3200..].to_vec(), trace.method)
     };
-    let (reference, method) = loads("");
+    let (reference_loads_n, method) = foot_loads_and_method("");
     assert_eq!(method, Some(MethodKind::Dop853));
-    let (expected, _) = loads("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
-    for (load_n, expected_n) in reference.iter().zip(&expected) {
+    let (expected_loads_n, _) =
+        foot_loads_and_method("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
+    for (load_n, expected_n) in reference_loads_n.iter().zip(&expected_loads_n) {
         assert!((load_n / expected_n - 1.0).abs() < 2e-3, "{load_n} for {expected_n}");
     }
 }
@@ -74,11 +75,11 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
     let engine = ModelEngine::new(&plan).unwrap();
     let points: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let every_s = 0.002;
-    let from = (plan.window_s[0] / every_s) as usize;
-    let mut capped_rows = 0;
+    let window_start_row = (plan.window_s[0] / every_s) as usize;
+    let mut capped_row_count = 0;
     for row in engine.outcomes_at(&points) {
         let Some(capped) = engine.capped_run(row.method) else { continue };
-        capped_rows += 1;
+        capped_row_count += 1;
         assert_eq!(capped.methods[0].kind, row.method);
         let settings = TraceSettings {
             every_s: Some(every_s),
@@ -87,29 +88,33 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
             extras: TraceExtras::default(),
             capped: Some(capped),
         };
-        let trace = trace_one_point(&plan, row.point, Vec::new(), &settings, Cancel::Never);
-        let (rows, _) = trace.unwrap().table.finish().unwrap();
+        let trace_result = trace_one_point(&plan, row.point, Vec::new(), &settings, Cancel::Never);
+        let (trace_rows, _) = trace_result.unwrap().table.finish().unwrap();
         // The row's level is that of the nonlinear model; the linear one may have another. Peaks
         // between long steps have an error of 1e-5.
-        for (name, model, over) in
+        for (name, model, max_excess) in
             [("nonlinear", &row.nonlinear, 1e-5), ("linear", &row.linear, 1e-3)]
         {
             for (channel, amplitude) in plan.reliability.channels.iter().zip(&model.amplitudes) {
-                let sampled = peak(&rows, &format!("{name}_{}", channel.name), from);
+                let sampled_peak =
+                    column_peak(&trace_rows, &format!("{name}_{}", channel.name), window_start_row);
                 // The trace may miss the peak, which lies between two instants.
-                let share = sampled / amplitude;
-                assert!((0.998..1.0 + over).contains(&share), "{row:?} {channel:?}: {share}");
+                let peak_ratio = sampled_peak / amplitude;
+                assert!(
+                    (0.998..1.0 + max_excess).contains(&peak_ratio),
+                    "{row:?} {channel:?}: {peak_ratio}"
+                );
             }
         }
     }
-    assert!(capped_rows >= 3, "{capped_rows}");
+    assert!(capped_row_count >= 3, "{capped_row_count}");
 }
 
 #[test]
 fn points_integrated_together_have_the_bits_that_each_has_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
-    // Several steps, and more machines than lanes.
+    // A run takes several steps, and there are more machines than lanes.
     let grid = "spin = { profile = \"ramp\", peak_rpm = 250, ramp_s = 2 }\n\
          time = { end_s = 4 }\n\
          [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4, 0.7]\n\
@@ -125,21 +130,22 @@ fn points_integrated_together_have_the_bits_that_each_has_alone() {
             extras,
             capped: None,
         };
-        let all = trace_all_points(&plan, &settings, Cancel::Never);
-        assert_eq!(every_s.is_none(), all.instants < 9 * 20);
-        let (all, _) = all.table.finish().unwrap();
-        let mut from = 0;
+        let all_traces = trace_all_points(&plan, &settings, Cancel::Never);
+        assert_eq!(every_s.is_none(), all_traces.instants < 9 * 20);
+        let (all_rows, _) = all_traces.table.finish().unwrap();
+        let mut first_row = 0;
         for point in 0..plan.points() {
-            let one = trace_one_point(&plan, point, Vec::new(), &settings, Cancel::Never).unwrap();
-            let (one, _) = one.table.finish().unwrap();
-            for (k, field) in one.schema().fields().iter().enumerate() {
-                let together = all.column_by_name(field.name()).unwrap();
-                let together = together.slice(from, one.num_rows());
-                assert_eq!(&together, one.column(k), "{field:?} at point {point}");
+            let point_trace =
+                trace_one_point(&plan, point, Vec::new(), &settings, Cancel::Never).unwrap();
+            let (point_rows, _) = point_trace.table.finish().unwrap();
+            for (k, field) in point_rows.schema().fields().iter().enumerate() {
+                let column_of_all = all_rows.column_by_name(field.name()).unwrap();
+                let slice_of_point = column_of_all.slice(first_row, point_rows.num_rows());
+                assert_eq!(&slice_of_point, point_rows.column(k), "{field:?} at point {point}");
             }
-            from += one.num_rows();
+            first_row += point_rows.num_rows();
         }
-        assert_eq!(all.num_rows(), from);
+        assert_eq!(all_rows.num_rows(), first_row);
     }
 }
 
@@ -159,9 +165,9 @@ fn plan_with_ramp(end_s: f64) -> Plan {
 #[test]
 fn too_many_turns_are_refused_before_any_work() {
     assert_eq!(check_spacing(None, &plan_with_ramp(90_000.0)).unwrap(), None);
-    let refused = check_spacing(None, &plan_with_ramp(110_000.0)).unwrap_err().to_string();
+    let refusal_message = check_spacing(None, &plan_with_ramp(110_000.0)).unwrap_err().to_string();
     for word in ["--turns to 110000 s", "at most 2000000 turns", "end_s"] {
-        assert!(refused.contains(word), "{refused}");
+        assert!(refusal_message.contains(word), "{refusal_message}");
     }
 }
 
@@ -175,8 +181,8 @@ fn the_angle_of_a_whole_turn_is_zero() {
         extras,
         capped: None,
     };
-    let all = trace_all_points(&plan_with_ramp(4.05), &settings, Cancel::Never);
-    assert_eq!(all.instants, 2 * 31);
-    let (rows, _) = all.table.finish().unwrap();
-    assert_eq!(peak(&rows, "drum_angle_rad", 0), 0.0);
+    let all_traces = trace_all_points(&plan_with_ramp(4.05), &settings, Cancel::Never);
+    assert_eq!(all_traces.instants, 2 * 31);
+    let (rows, _) = all_traces.table.finish().unwrap();
+    assert_eq!(column_peak(&rows, "drum_angle_rad", 0), 0.0);
 }

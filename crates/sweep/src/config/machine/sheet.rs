@@ -4,17 +4,17 @@ use sweep_engine::config::{Field, Form, Keys, Section, keys};
 use sweep_parameter::Range;
 use washer_model::{DataSheet, Machine, MachineParameter};
 
-use super::{MachineSection, find_parameter, no_spin};
+use super::{MachineSection, find_parameter, spin_without_parameters};
 
 /// The key of the data sheet's mass, at the top of a machine file.
-pub(super) const MOVING_MASS: &str = "moving_mass_kg";
+pub(super) const MOVING_MASS_KEY: &str = "moving_mass_kg";
 
 /// The keys of a data sheet in a machine file. Numbers that the file omits follow from them.
 #[derive(Default)]
 pub(super) struct SheetKeys {
     /// Whether the file gives a number of a data sheet, so that it may omit numbers that follow
     /// from a complete sheet.
-    pub(super) is_given: bool,
+    pub(super) has_sheet_key: bool,
     moving_mass_kg: Option<f64>,
     drum_radius_m: Option<f64>,
     drum_depth_m: Option<f64>,
@@ -47,22 +47,22 @@ impl DrumPlane {
 }
 
 /// Sections of unbalances.
-pub(super) const UNBALANCES: [&str; 2] = ["unbalance", "further_unbalances"];
+pub(super) const UNBALANCE_SECTIONS: [&str; 2] = ["unbalance", "further_unbalances"];
 
 /// The key of an unbalance's position along the axis.
-pub(super) const UNBALANCE_X: &str = "x_m";
+pub(super) const UNBALANCE_POSITION_KEY: &str = "x_m";
 
 /// The key that gives the position of an unbalance by the name of a plane.
-const UNBALANCE_PLANE: &str = "plane";
+const UNBALANCE_PLANE_KEY: &str = "plane";
 
 /// The key of the drum's inner radius.
-const DRUM_RADIUS: &str = "radius_m";
+const DRUM_RADIUS_KEY: &str = "radius_m";
 
 /// The key of the drum's inner depth.
-const DRUM_DEPTH: &str = "depth_m";
+const DRUM_DEPTH_KEY: &str = "depth_m";
 
 /// The keys of the drum's size, without which no number may be omitted.
-const DRUM_SIZES: [&str; 2] = [DRUM_RADIUS, DRUM_DEPTH];
+const DRUM_SIZE_KEYS: [&str; 2] = [DRUM_RADIUS_KEY, DRUM_DEPTH_KEY];
 
 /// The range of the drum's inner radius and depth (m).
 const DRUM_SIZE_FORM: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
@@ -70,11 +70,12 @@ const DRUM_SIZE_FORM: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
 impl SheetKeys {
     /// Creates the data sheet of a file whose keys have not been read.
     pub(super) fn new(keys: &Keys<'_>) -> Self {
-        let has_any = |root: &Section<'_>| {
+        let has_any_sheet_key = |root: &Section<'_>| {
             let is_drum_key = |key: &str| root.has_inner_key("drum", key);
-            root.key_location(MOVING_MASS).is_some() || DRUM_SIZES.into_iter().any(is_drum_key)
+            root.key_location(MOVING_MASS_KEY).is_some()
+                || DRUM_SIZE_KEYS.into_iter().any(is_drum_key)
         };
-        Self { is_given: keys.section().is_some_and(has_any), ..Self::default() }
+        Self { has_sheet_key: keys.section().is_some_and(has_any_sheet_key), ..Self::default() }
     }
 
     /// Walks over the data sheet's keys of element `k` of a section.
@@ -83,18 +84,20 @@ impl SheetKeys {
             "" => {
                 let description =
                     "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
-                let key = keys::Key::new(MOVING_MASS, description);
+                let key = keys::Key::new(MOVING_MASS_KEY, description);
                 keys.walk_key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
             }
             "drum" => {
-                let key =
-                    keys::Key::new(DRUM_RADIUS, "inner radius; other numbers follow from it, m");
+                let key = keys::Key::new(
+                    DRUM_RADIUS_KEY,
+                    "inner radius; other numbers follow from it, m",
+                );
                 keys.walk_key(key, &DRUM_SIZE_FORM, &mut self.drum_radius_m);
                 let key =
-                    keys::Key::new(DRUM_DEPTH, "inner depth; other numbers follow from it, m");
+                    keys::Key::new(DRUM_DEPTH_KEY, "inner depth; other numbers follow from it, m");
                 keys.walk_key(key, &DRUM_SIZE_FORM, &mut self.drum_depth_m);
             }
-            name if UNBALANCES.contains(&name) => self.walk_plane(section, k, keys),
+            name if UNBALANCE_SECTIONS.contains(&name) => self.walk_plane(section, k, keys),
             _ => {}
         }
     }
@@ -102,33 +105,34 @@ impl SheetKeys {
     /// Walks over the name of an unbalance's plane, which replaces its position along the axis.
     fn walk_plane(&mut self, section: &MachineSection, k: usize, keys: &mut Keys<'_>) {
         let description = "the drum's front, or its rear where it is fixed: in place of x_m";
-        let mut word: Option<String> = None;
-        let names = DrumPlane::ALL.map(|(_, name)| name);
+        let mut plane_name: Option<String> = None;
+        let plane_names = DrumPlane::ALL.map(|(_, name)| name);
         let field = keys.walk_key(
-            keys::Key::new(UNBALANCE_PLANE, description),
-            &Form::Word(&names),
-            &mut word,
+            keys::Key::new(UNBALANCE_PLANE_KEY, description),
+            &Form::Word(&plane_names),
+            &mut plane_name,
         );
-        let plane = DrumPlane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
+        let plane =
+            DrumPlane::ALL.into_iter().find(|(_, name)| plane_name.as_deref() == Some(name));
         let (Field::Present(location), Some((plane, _))) = (field, plane) else { return };
         let Some(table) = keys.section() else { return };
-        if table.key_location(UNBALANCE_X).is_some() {
-            let title = format!("`{UNBALANCE_PLANE}` beside `{UNBALANCE_X}`");
+        if table.key_location(UNBALANCE_POSITION_KEY).is_some() {
+            let title = format!("`{UNBALANCE_PLANE_KEY}` beside `{UNBALANCE_POSITION_KEY}`");
             let expected = "expected only one of them: both say where the unbalance is";
             table.report.refuse::<()>(&location.location, title, expected);
         }
-        let name = format!("{}{UNBALANCE_X}", section.prefix(k));
+        let name = format!("{}{UNBALANCE_POSITION_KEY}", section.element_prefix(k));
         table.report.record_location(name.as_str(), location.location);
         // The paper's machine has no further unbalances, so it has no parameters of them.
-        let machine = with_unbalances(k + 1);
+        let machine = machine_with_unbalances(k + 1);
         self.plane_positions
             .extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
     }
 
-    /// Whether the position of element `k` along the axis is given by the name of a plane.
+    /// Returns whether the position of element `k` along the axis is given by the name of a plane.
     pub(super) fn has_plane(&self, section: &MachineSection, k: usize, key: &str) -> bool {
-        let name = format!("{}{UNBALANCE_X}", section.prefix(k));
-        key == UNBALANCE_X
+        let name = format!("{}{UNBALANCE_POSITION_KEY}", section.element_prefix(k));
+        key == UNBALANCE_POSITION_KEY
             && self.plane_positions.iter().any(|(parameter, _)| parameter.name() == name)
     }
 
@@ -138,7 +142,7 @@ impl SheetKeys {
         let report = root.report;
         let is_omitted =
             |name: &str| self.omitted_parameters.iter().any(|parameter| parameter.name() == name);
-        let masses_omitted = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
+        let mass_is_omitted = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
         let sheet = DataSheet {
             moving_mass_kg: self.moving_mass_kg,
             drum_radius_m: self.drum_radius_m.unwrap_or_default(),
@@ -146,27 +150,27 @@ impl SheetKeys {
         };
         let is_complete = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
         if !self.omitted_parameters.is_empty() {
-            for key in DRUM_SIZES.into_iter().filter(|key| !root.has_inner_key("drum", key)) {
+            for key in DRUM_SIZE_KEYS.into_iter().filter(|key| !root.has_inner_key("drum", key)) {
                 let expected = "the drum's inner radius_m and depth_m in [drum], from which the \
                                 numbers that are left out follow";
                 root.report_missing(key, expected);
             }
         }
-        if sheet.moving_mass_kg.is_some() && !masses_omitted[0] {
-            let title = format!("`{MOVING_MASS}` beside the tub's mass");
+        if sheet.moving_mass_kg.is_some() && !mass_is_omitted[0] {
+            let title = format!("`{MOVING_MASS_KEY}` beside the tub's mass");
             let expected =
                 "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
             let location =
-                root.key_location(MOVING_MASS).unwrap_or_else(|| root.location().clone());
+                root.key_location(MOVING_MASS_KEY).unwrap_or_else(|| root.location().clone());
             report.refuse::<()>(&location, title, expected);
-        } else if masses_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
+        } else if mass_is_omitted.contains(&true) && sheet.moving_mass_kg.is_none() {
             let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
-            root.report_missing(MOVING_MASS, expected);
+            root.report_missing(MOVING_MASS_KEY, expected);
         } else if is_complete {
             sheet.fill_omitted(&self.omitted_parameters, machine);
         }
         for parameter in &self.omitted_parameters {
-            let Some(value) = parameter.get(machine, &no_spin()) else { continue };
+            let Some(value) = parameter.get(machine, &spin_without_parameters()) else { continue };
             if is_complete && !parameter.range().contains(value) {
                 let name = parameter.name();
                 let range = parameter.range();
@@ -185,8 +189,8 @@ impl SheetKeys {
 }
 
 /// Returns the paper's machine with a number of further unbalances.
-fn with_unbalances(count: usize) -> Machine {
+fn machine_with_unbalances(further_count: usize) -> Machine {
     let mut machine = Machine::paper();
-    machine.further_unbalances = vec![Default::default(); count];
+    machine.further_unbalances = vec![Default::default(); further_count];
     machine
 }

@@ -46,7 +46,7 @@ pub(super) fn read(
 ) -> Option<CyclePoints> {
     let table = NumberTable::read_point_list(
         path,
-        &ColumnNames { find_quantity: &quantity_and_unit, renamed_headers: &[] },
+        &ColumnNames { find_quantity: &find_quantity_and_unit, renamed_headers: &[] },
         report,
     )?;
     table.notes().into_iter().for_each(|note| report.add_note(format!("the cycle: {note}")));
@@ -59,14 +59,14 @@ pub(super) fn read(
     }
     // Smooth joints multiply the number of rows by up to a hundred, so that a table that is too
     // long is not joined.
-    let is_short = |rows: usize| rows <= MAX_TABLE_ROWS;
+    let fits_in_table = |rows: usize| rows <= MAX_TABLE_ROWS;
     let points = match joints {
-        JointKind::Smooth if is_short(times.values.len()) => {
+        JointKind::Smooth if fits_in_table(times.values.len()) => {
             interpolate_smoothly(&times.values, &speeds.values)
         }
         _ => (times.values.clone(), speeds.values.clone()),
     };
-    if !is_short(points.0.len()) {
+    if !fits_in_table(points.0.len()) {
         let title =
             format!("the cycle has {} with its joints", format_count(points.0.len(), "row"));
         let expected = format!(
@@ -78,7 +78,7 @@ pub(super) fn read(
 }
 
 /// Returns the quantity and the unit of a header, if the header is known.
-fn quantity_and_unit(header: &str) -> Option<(String, String)> {
+fn find_quantity_and_unit(header: &str) -> Option<(String, String)> {
     let [name, unit] = match header {
         "time_s" | "t_s" | "zeit_s" => ["time_s", "s"],
         "speed_rpm" | "spin_speed_rpm" | "drum_speed_rpm" | "drehzahl_rpm" | "n_rpm" | "rpm" => {
@@ -97,13 +97,13 @@ fn find_column<'t>(
     location: &Location,
     report: &Report,
 ) -> Option<&'t ListColumn> {
-    let mut matching = table.columns.iter().filter(|column| column.name.value == name);
-    let first = matching.next();
-    if let Some(second) = matching.next() {
+    let mut matching_columns = table.columns.iter().filter(|column| column.name.value == name);
+    let first_match = matching_columns.next();
+    if let Some(second) = matching_columns.next() {
         let title = format!("the cycle's file has two columns of {quantity}");
         return report.refuse(&second.name.location, title, "expected one");
     }
-    if first.is_none() {
+    if first_match.is_none() {
         let headers: Vec<&str> =
             table.columns.iter().map(|column| column.header.as_str()).collect();
         let title = format!("the cycle's file has no column of {quantity} with its unit");
@@ -112,7 +112,7 @@ fn find_column<'t>(
         let refusal = Diagnostic::new(title).at_location(location, expected);
         report.push(refusal.with_help(format!("its columns are {headers:?}")));
     }
-    first
+    first_match
 }
 
 /// Returns whether times increase from 0 and all speeds are given and within their range. The first
@@ -125,8 +125,8 @@ fn check_columns(
 ) -> bool {
     let refuse = |column: &ListColumn, row: usize, title: String, expected: &str| {
         report.push_with(|sources| {
-            let at = table.locate(sources, column.column_index, row);
-            Diagnostic::new(title).at_location(&at, expected)
+            let cell_location = table.locate(sources, column.column_index, row);
+            Diagnostic::new(title).at_location(&cell_location, expected)
         });
     };
     let values = &times.values;
@@ -162,35 +162,36 @@ fn check_columns(
 /// F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical
 /// Analysis 17 (1980), 238-246.
 fn interpolate_smoothly(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
-    let slopes = monotone_slopes(time_s, speed_rpm);
-    let greatest = speed_rpm.iter().fold(0.0, |greatest: f64, speed| greatest.max(speed.abs()));
-    let tolerance = JOINT_TOLERANCE * greatest;
+    let slopes = compute_monotone_slopes(time_s, speed_rpm);
+    let greatest_speed_rpm =
+        speed_rpm.iter().fold(0.0, |greatest: f64, speed| greatest.max(speed.abs()));
+    let tolerance_rpm = JOINT_TOLERANCE * greatest_speed_rpm;
     let mut points = (vec![time_s[0]], vec![speed_rpm[0]]);
     for k in 1..time_s.len() {
         let length_s = time_s[k] - time_s[k - 1];
-        let change = speed_rpm[k] - speed_rpm[k - 1];
-        let [start_slope, end_slope] = [slopes[k - 1] * length_s, slopes[k] * length_s];
+        let change_rpm = speed_rpm[k] - speed_rpm[k - 1];
+        let [start_slope_rpm, end_slope_rpm] = [slopes[k - 1] * length_s, slopes[k] * length_s];
         // The second derivative is linear, so that it is greatest at an end. It bounds the distance
         // of a chord from the cubic.
         let end_curvatures = [
-            6.0 * change - 4.0 * start_slope - 2.0 * end_slope,
-            2.0 * start_slope + 4.0 * end_slope - 6.0 * change,
+            6.0 * change_rpm - 4.0 * start_slope_rpm - 2.0 * end_slope_rpm,
+            2.0 * start_slope_rpm + 4.0 * end_slope_rpm - 6.0 * change_rpm,
         ];
-        let curvature = end_curvatures[0].abs().max(end_curvatures[1].abs());
-        let pieces = if tolerance > 0.0 {
-            (curvature / (8.0 * tolerance)).sqrt().ceil().max(1.0)
+        let max_curvature = end_curvatures[0].abs().max(end_curvatures[1].abs());
+        let exact_piece_count = if tolerance_rpm > 0.0 {
+            (max_curvature / (8.0 * tolerance_rpm)).sqrt().ceil().max(1.0)
         } else {
             1.0
         };
-        let pieces = pieces as usize;
-        for piece in 1..pieces {
-            let fraction = piece as f64 / pieces as f64;
+        let piece_count = exact_piece_count as usize;
+        for piece in 1..piece_count {
+            let fraction = piece as f64 / piece_count as f64;
             let remainder = 1.0 - fraction;
             let change_weight = fraction * fraction * (3.0 - 2.0 * fraction);
-            let slope_part =
-                fraction * remainder * (remainder * start_slope - fraction * end_slope);
+            let slope_contribution_rpm =
+                fraction * remainder * (remainder * start_slope_rpm - fraction * end_slope_rpm);
             points.0.push(time_s[k - 1] + fraction * length_s);
-            points.1.push(speed_rpm[k - 1] + change_weight * change + slope_part);
+            points.1.push(speed_rpm[k - 1] + change_weight * change_rpm + slope_contribution_rpm);
         }
         points.0.push(time_s[k]);
         points.1.push(speed_rpm[k]);
@@ -199,16 +200,16 @@ fn interpolate_smoothly(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
 }
 
 /// Returns the slopes of monotone cubics at points (rpm/s).
-fn monotone_slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
-    let chords: Vec<f64> = (1..time_s.len())
+fn compute_monotone_slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
+    let chord_slopes: Vec<f64> = (1..time_s.len())
         .map(|k| (speed_rpm[k] - speed_rpm[k - 1]) / (time_s[k] - time_s[k - 1]))
         .collect();
     let mut slopes = vec![0.0; time_s.len()];
-    for k in 1..chords.len() {
-        let is_extremum = chords[k - 1] * chords[k] <= 0.0;
-        slopes[k] = if is_extremum { 0.0 } else { 0.5 * (chords[k - 1] + chords[k]) };
+    for k in 1..chord_slopes.len() {
+        let is_extremum = chord_slopes[k - 1] * chord_slopes[k] <= 0.0;
+        slopes[k] = if is_extremum { 0.0 } else { 0.5 * (chord_slopes[k - 1] + chord_slopes[k]) };
     }
-    for (k, chord) in chords.iter().copied().enumerate() {
+    for (k, chord) in chord_slopes.iter().copied().enumerate() {
         if chord == 0.0 {
             continue;
         }
@@ -240,9 +241,13 @@ mod tests {
             assert_eq!(speeds[position], speed);
         }
         for k in 1..TIMES_S.len() {
-            let is_between = |time: &f64| (TIMES_S[k - 1]..=TIMES_S[k]).contains(time);
-            let speeds_between: Vec<f64> =
-                times.iter().zip(&speeds).filter(|(t, _)| is_between(t)).map(|(_, s)| *s).collect();
+            let is_between_points = |time: &f64| (TIMES_S[k - 1]..=TIMES_S[k]).contains(time);
+            let speeds_between: Vec<f64> = times
+                .iter()
+                .zip(&speeds)
+                .filter(|(t, _)| is_between_points(t))
+                .map(|(_, s)| *s)
+                .collect();
             let [least, greatest] =
                 [SPEEDS_RPM[k - 1].min(SPEEDS_RPM[k]), SPEEDS_RPM[k - 1].max(SPEEDS_RPM[k])];
             assert!(
@@ -263,11 +268,14 @@ mod tests {
         let mut largest_error: f64 = 0.0;
         for k in 1..times.len() {
             for step in 0..=20 {
-                let step_fraction = f64::from(step) / 20.0;
-                let fraction = (times[k - 1] + step_fraction * (times[k] - times[k - 1])) / 10.0;
-                let cubic = 1000.0 * fraction * fraction * (3.0 - 2.0 * fraction);
+                let piece_fraction = f64::from(step) / 20.0;
+                let joint_fraction =
+                    (times[k - 1] + piece_fraction * (times[k] - times[k - 1])) / 10.0;
+                let exact_rpm =
+                    1000.0 * joint_fraction * joint_fraction * (3.0 - 2.0 * joint_fraction);
                 largest_error = largest_error.max(
-                    (speeds[k - 1] + step_fraction * (speeds[k] - speeds[k - 1]) - cubic).abs(),
+                    (speeds[k - 1] + piece_fraction * (speeds[k] - speeds[k - 1]) - exact_rpm)
+                        .abs(),
                 );
             }
         }

@@ -3,7 +3,7 @@
 use washer_row::Metric;
 
 use super::super::WasherGridInput;
-use super::super::machine::with_one_of_each;
+use super::super::machine::machine_with_every_element;
 
 const GRID: &str = r#"
 name = "again"
@@ -33,7 +33,7 @@ fn a_plan_is_read_back_from_its_json() {
     // This machine has stops, and the metric of stop forces needs no held speeds.
     plan.model.measures.metrics = vec![Metric::StopForce];
     plan.model.held_speeds = None;
-    plan.model.machine = with_one_of_each();
+    plan.model.machine = machine_with_every_element();
     plan.model.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
         .map(|foot_m| washer_model::Foot { foot_m })
         .to_vec();
