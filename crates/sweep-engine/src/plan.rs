@@ -366,7 +366,7 @@ mod tests {
         // The values of numpy.linspace(0.05, 1.0, 39), which computes i * step + start and replaces
         // the last value by the end.
         let masses = AxisValues::Linear { from: 0.05, to: 1.0, count: 39 };
-        let expected = [
+        let expected_values = [
             (0, 0.05),
             (1, 0.075),
             (2, 0.1),
@@ -374,7 +374,7 @@ mod tests {
             (37, 0.975),
             (38, 1.0),
         ];
-        for (i, value) in expected {
+        for (i, value) in expected_values {
             assert_eq!(masses.value(i), value, "{i}");
         }
         let dampings = AxisValues::Linear { from: 60.0, to: 300.0, count: 33 };

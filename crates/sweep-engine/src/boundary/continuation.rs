@@ -307,8 +307,9 @@ mod tests {
         let unreliable = LimitSide::Unreliable;
         let sides_with_two_crossings: Option<Vec<_>> =
             predict_between(&[20.0, 60.0], &[22.0, 64.0]);
-        let expected = [(20.0, unreliable), (22.0, reliable), (60.0, reliable), (64.0, unreliable)];
-        assert_eq!(sides_with_two_crossings, Some(expected.to_vec()));
+        let expected_sides =
+            [(20.0, unreliable), (22.0, reliable), (60.0, reliable), (64.0, unreliable)];
+        assert_eq!(sides_with_two_crossings, Some(expected_sides.to_vec()));
         let sides_without_crossings = predict_between(&[], &[]);
         assert_eq!(sides_without_crossings, Some(vec![(0.0, unreliable), (100.0, unreliable)]));
         assert_eq!(predict_between(&[20.0], &[]), None);

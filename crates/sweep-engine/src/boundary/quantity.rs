@@ -140,12 +140,12 @@ pub fn derive_quantity<M: Model>(
     let condition = Goal::constraint(text, &all_columns);
     let goal = match (condition, Goal::objective(text, &all_columns), limit) {
         (Ok(_), _, Some(limit)) => {
-            let expected = "none with a condition, which has limits of its own";
-            return Err(Error::option("--limit", limit, expected));
+            let expectation = "none with a condition, which has limits of its own";
+            return Err(Error::option("--limit", limit, expectation));
         }
         (Err(_), Ok(_), None) => {
-            let expected = format!("--limit with it, or a condition such as `{text} < 2`");
-            return Err(Error::option("--quantity", text, expected));
+            let expectation = format!("--limit with it, or a condition such as `{text} < 2`");
+            return Err(Error::option("--quantity", text, expectation));
         }
         (Ok(goal), _, None) | (Err(_), Ok(goal), Some(_)) => goal,
         (Err(mistake), Err(number_mistake), limit) => {
@@ -159,8 +159,8 @@ pub fn derive_quantity<M: Model>(
         }
     };
     if !goal.is_by_row() {
-        let expected = "an expression of a row's columns, without min(), max() and the like";
-        return Err(Error::option("--quantity", text, expected));
+        let expectation = "an expression of a row's columns, without min(), max() and the like";
+        return Err(Error::option("--quantity", text, expectation));
     }
     let has_all_columns = |columns: &&Vec<KnownColumn>| {
         goal.columns().all(|name| columns.iter().any(|column| column.name == name))
@@ -169,8 +169,8 @@ pub fn derive_quantity<M: Model>(
     else {
         let names: Vec<&str> = goal.columns().collect();
         let names = names.join(", ");
-        let expected = format!("columns that one grid file has; ask in it for all of {names}");
-        return Err(Error::option("--quantity", text, expected));
+        let expectation = format!("columns that one grid file has; ask in it for all of {names}");
+        return Err(Error::option("--quantity", text, expectation));
     };
     let quantity = match limit {
         None => TracedQuantity {
@@ -267,21 +267,21 @@ pub fn find_quantity<M: Model>(
         let names = names.join(", ");
         let [ratio, nonlinear, linear] = channel_column_names("CHANNEL");
         let optional_columns = M::ABOUT.further_columns;
-        let expected =
+        let expectation =
             format!("one of {names}, {ratio}, {nonlinear}, {linear}{optional_columns}{suggestion}");
-        return Err(Error::option("--quantity", name, expected));
+        return Err(Error::option("--quantity", name, expectation));
     };
     let (column, mut plan) = candidates.swap_remove(index);
     let Some(limit_value) = limit.or(column.metadata.limit) else {
         let unit = &column.metadata.unit;
-        let expected = format!("--limit with it, in {unit}: it has no limit of its own");
-        return Err(Error::option("--quantity", name, expected));
+        let expectation = format!("--limit with it, in {unit}: it has no limit of its own");
+        return Err(Error::option("--quantity", name, expectation));
     };
     let is_ratio = name.starts_with(RATIO_PREFIX);
     let distance_scale = column.limit_scale.unwrap_or(limit_value.abs());
     if !limit_value.is_finite() || (is_ratio && limit_value <= 0.0) || distance_scale == 0.0 {
-        let expected = format!("a number greater than 0, as {name} is never below");
-        return Err(Error::option("--limit", limit_value, expected));
+        let expectation = format!("a number greater than 0, as {name} is never below");
+        return Err(Error::option("--limit", limit_value, expectation));
     }
     if name == LEAST_RATIO_COLUMN {
         plan.reliability.limits.lower = Some(limit_value);

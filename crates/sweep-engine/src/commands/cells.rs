@@ -125,9 +125,9 @@ mod tests {
                 .into_iter()
                 .map(format_number)
                 .collect();
-        let expected =
+        let expected_values =
             ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333", "0.55", "0.00123457"];
-        assert_eq!(formatted, expected);
+        assert_eq!(formatted, expected_values);
     }
 
     #[test]

@@ -94,8 +94,8 @@ pub fn run<M: Model>(args: &CompareArgs) -> Result<Exit, Error> {
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
         if !comparison.has_verdicts {
-            let expected = "two maps: other files have no differences row by row";
-            return Err(Error::option("--out", path.display(), expected));
+            let expectation = "two maps: other files have no differences row by row";
+            return Err(Error::option("--out", path.display(), expectation));
         }
         output.finish(
             &differences::differences_table(args, &comparison, &compared_tables, M::ABOUT.build)

@@ -39,9 +39,9 @@ pub fn parse_filter(
     if let Some(Condition { text, .. }) =
         condition.as_ref().filter(|condition| condition.has_aggregates())
     {
-        let expected =
+        let expectation =
             "an expression without count(), share(), min(), max(), mean() and quantile()";
-        return Err(Error::option("--where", text, expected));
+        return Err(Error::option("--where", text, expectation));
     }
     Ok(condition)
 }

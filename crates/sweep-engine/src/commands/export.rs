@@ -38,8 +38,8 @@ impl ExportArgs {
 pub fn run(args: &ExportArgs) -> Result<Exit, Error> {
     let output_path = args.output_path();
     let Some(format) = ExportFormat::from_path(output_path) else {
-        let expected = format!("a name that ends in {}", list_extensions());
-        return Err(Error::option("OUT", output_path.display(), &expected));
+        let expectation = format!("a name that ends in {}", list_extensions());
+        return Err(Error::option("OUT", output_path.display(), &expectation));
     };
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;

@@ -209,14 +209,14 @@ fn claim_model_file<'a, M: Model>(
     output: &Path,
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };
-    let refuse_path = |expected: &str| Err(Error::option("--best", path.display(), expected));
+    let refuse_path = |expectation: &str| Err(Error::option("--best", path.display(), expectation));
     if M::ABOUT.model_file.is_none() {
         return refuse_path("a model with a file of its own");
     }
     let candidates = study.evolution.candidate_count;
     if let Some(candidate) = args.candidate.filter(|&candidate| candidate >= candidates) {
-        let expected = format!("a number from 0 to {}", candidates - 1);
-        return Err(Error::option("--candidate", candidate, expected));
+        let expectation = format!("a number from 0 to {}", candidates - 1);
+        return Err(Error::option("--candidate", candidate, expectation));
     }
     let model_file_output = Output::begin(path, FileKind::ModelFile)?;
     // The files may not exist yet, so the paths of their folders are compared.

@@ -53,15 +53,15 @@ pub fn run<M: Model>(
 ) -> Result<Exit, Error> {
     let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("report.html"));
     if let Some(path) = args.further.iter().find(|path| is_expression(path)) {
-        let expected = "a file; each expression needs a `--require` of its own";
-        return Err(Error::option("FILE", path.display(), expected));
+        let expectation = "a file; each expression needs a `--require` of its own";
+        return Err(Error::option("FILE", path.display(), expectation));
     }
     refuse_unfinished(&args.result)?;
     let file = ResultTable::open(&args.result)?;
     let page_output = Output::begin(&output, FileKind::Html)?;
     if file.file().kind() != Some(FileKind::Map) {
-        let expected = format!("a {}; other files go behind it", FileKind::Map.name());
-        return Err(Error::option("RESULT", args.result.display(), expected));
+        let expectation = format!("a {}; other files go behind it", FileKind::Map.name());
+        return Err(Error::option("RESULT", args.result.display(), expectation));
     }
     let requirements = conditions::parse_conditions("--require", &args.requirements, &file)?;
     let (picture, description) = describe_as_html(&args.result, model)?;
@@ -159,10 +159,10 @@ fn is_expression(path: &Path) -> bool {
 
 /// Describes the range of reliable ratios.
 fn describe_range(limits: RatioLimits) -> String {
-    let upper = format_number(limits.upper);
+    let upper_text = format_number(limits.upper);
     limits.lower.map_or_else(
-        || format!("below {upper}"),
-        |lower| format!("between {} and {upper}", format_number(lower)),
+        || format!("below {upper_text}"),
+        |lower| format!("between {} and {upper_text}", format_number(lower)),
     )
 }
 

@@ -297,10 +297,10 @@ pub fn format_counts_at(
     axis_values: &dyn Fn(u64) -> String,
 ) -> String {
     let mut text = String::new();
-    let upper = limits.upper;
+    let upper_limit = limits.upper;
     let range_text = limits.lower.map_or_else(
-        || format!("below ratio {upper}"),
-        |lower| format!("with ratios from {lower} to {upper}"),
+        || format!("below ratio {upper_limit}"),
+        |lower| format!("with ratios from {lower} to {upper_limit}"),
     );
     let Tally { reliable, unreliable, undefined, over_estimated, sensitive, unconverged, .. } =
         tally;

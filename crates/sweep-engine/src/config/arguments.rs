@@ -61,8 +61,8 @@ impl<'a> NamedArgument<'a> {
             let title = format!("`{}` is not a valid number", shorten(self.value.value));
             let least = bounds.start();
             let greatest = bounds.end();
-            let expected = format!("expected a whole number from {least} to {greatest}");
-            self.report.refuse(&self.value.location, title, expected)
+            let expectation = format!("expected a whole number from {least} to {greatest}");
+            self.report.refuse(&self.value.location, title, expectation)
         })
     }
 

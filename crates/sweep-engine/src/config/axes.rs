@@ -66,11 +66,11 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
         };
         if sections.is_empty() || sections.len() > max_count {
             let title = format!("a design by \"{}\" over {} axes", design.method(), sections.len());
-            let expected = match max_count {
+            let expectation = match max_count {
                 usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
                 max_count => format!("expected from 1 to {max_count} [[axis]], each with a range"),
             };
-            report.refuse::<()>(&location, title, expected);
+            report.refuse::<()>(&location, title, expectation);
         }
     }
     let mut point_count: Option<u64> = Some(1);
@@ -102,8 +102,8 @@ pub fn read_axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &m
                 let title = format!(
                     "too many grid points: {point_count} before this axis, times {value_count}"
                 );
-                let expected = format!("expected at most {MAX_POINTS} in all");
-                report.refuse::<()>(&values.location, title, expected);
+                let expectation = format!("expected at most {MAX_POINTS} in all");
+                report.refuse::<()>(&values.location, title, expectation);
             }
             point_count = new_point_count;
         }
@@ -130,8 +130,8 @@ pub fn add_axis<M: Model>(axis: Axis<M>, location: Location, draft: &mut Draft<'
 pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &mut Draft<'_, M>) {
     let report = root.report;
     for section in root.tables("axis") {
-        let expected = "the columns of the list are the axes; remove this";
-        report.refuse::<()>(section.location(), "an [[axis]] beside a list of points", expected);
+        let expectation = "the columns of the list are the axes; remove this";
+        report.refuse::<()>(section.location(), "an [[axis]] beside a list of points", expectation);
     }
     let mut written_numbers = WrittenNumbers::default();
     list.table.notes().into_iter().for_each(|note| report.add_note(format!("the list: {note}")));
@@ -171,12 +171,12 @@ pub fn add_list_axes<M: Model>(root: &Section<'_>, mut list: PointList, draft: &
     if draft.plan.axes.is_empty() && report.is_clean() {
         let refusal = Diagnostic::new("the list of points has no column of a parameter")
             .with_help("`[columns]` in the grid file may name what its columns hold");
-        let expected = "expected a file whose header names parameters";
+        let expectation = "expected a file whose header names parameters";
         let location = report.location("design.file");
         report.push(
             location
                 .into_iter()
-                .fold(refusal, |refusal, location| refusal.at_location(&location, expected)),
+                .fold(refusal, |refusal, location| refusal.at_location(&location, expectation)),
         );
     }
     draft.plan.design = Some(list.design);
@@ -232,9 +232,9 @@ impl<'p> SweptParameter<'p> {
             let number = percent_text.unwrap_or(text).parse().ok();
             let Some(number) = number.filter(|number| Range::Positive.contains(*number)) else {
                 let title = format!("`tolerance` = \"{}\" is no tolerance", shorten(text));
-                let expected = "expected a positive number in the parameter's unit, or percent of \
-                    its value as in \"5 %\"";
-                return report.refuse(&location, title, expected);
+                let expectation = "expected a positive number in the parameter's unit, or percent \
+                                   of its value as in \"5 %\"";
+                return report.refuse(&location, title, expectation);
             };
             if self.name.is_empty() {
                 return None;
@@ -242,9 +242,9 @@ impl<'p> SweptParameter<'p> {
             let Some(nominal) = self.value else {
                 let title =
                     format!("`{}` has no single number as the middle of a tolerance", self.name);
-                let expected =
+                let expectation =
                     "expected a range: it sets numbers that differ, or that the model lacks";
-                return report.refuse(&location, title, expected);
+                return report.refuse(&location, title, expectation);
             };
             // This order of operations is exact for round numbers: 120 less 5 % is 114.
             let [from, to] = match percent_text {
@@ -402,8 +402,8 @@ fn read_distribution(
         let title = format!(
             "a distribution from {from_text} to {to_text} has no {points} different values"
         );
-        let expected = "expected a wider one, or fewer `points` in [design]";
-        return report.refuse(&location, title, expected);
+        let expectation = "expected a wider one, or fewer `points` in [design]";
+        return report.refuse(&location, title, expectation);
     }
     let values = match shape {
         None => AxisValues::Linear { from, to, count: 2 },
@@ -413,8 +413,8 @@ fn read_distribution(
                 let title =
                     format!("no part of the distribution lies between {from_text} and {to_text}");
                 let [low, high] = [low, high].map(decimal);
-                let expected = format!("expected bounds within {low} and {high}");
-                return report.refuse(&location, title, expected);
+                let expectation = format!("expected bounds within {low} and {high}");
+                return report.refuse(&location, title, expectation);
             }
             AxisValues::Distributed(Distribution { shape, from, to })
         }
@@ -477,9 +477,9 @@ fn read_values(
     let tolerance = swept_parameter.read_tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.mark_misplaced(&["values", "range"], MISPLACED_BESIDE_TOLERANCE);
-        let expected = "the number of values, both ends included";
+        let expectation = "the number of values, both ends included";
         let value_count = section.whole_number("count", &(2..=MAX_POINTS));
-        let value_count = section.require(value_count, "count", expected);
+        let value_count = section.require(value_count, "count", expectation);
         let Located { value: range, location } = tolerance.into_located()?;
         let value_count = value_count?.value;
         if let Some(max_count) =
@@ -564,8 +564,8 @@ pub fn read_range(
         ["from", "to"].map(|key| section.require(section.number(key, range), key, "a number"));
     let count = match points {
         None => {
-            let expected = "the number of values, both ends included";
-            section.require(section.whole_number("count", &(1..=MAX_POINTS)), "count", expected)
+            let expectation = "the number of values, both ends included";
+            section.require(section.whole_number("count", &(1..=MAX_POINTS)), "count", expectation)
         }
         Some(value) => {
             let misplacement_reason = "the number of points belongs in [design], as `points`";
@@ -598,8 +598,8 @@ pub fn read_range(
     if is_logarithmic && !(from.value > 0.0 && to.value > 0.0) {
         let end = if from.value > 0.0 { &to } else { &from };
         let title = format!("{} has no logarithm", decimal(end.value));
-        let expected = "expected a number greater than 0, or spacing = \"linear\"";
-        return report.refuse(&end.location, title, expected);
+        let expectation = "expected a number greater than 0, or spacing = \"linear\"";
+        return report.refuse(&end.location, title, expectation);
     }
     if let Some(max_count) =
         max_distinct_values(from.value, to.value).filter(|&max_count| max_count < count.value)
@@ -609,11 +609,11 @@ pub fn read_range(
             count.value
         );
         if is_design {
-            let expected = "expected ends farther apart, or fewer `points` in [design]";
-            return report.refuse(&to.location, title, expected);
+            let expectation = "expected ends farther apart, or fewer `points` in [design]";
+            return report.refuse(&to.location, title, expectation);
         }
-        let expected = format!("expected at most {max_count}, or ends farther apart");
-        return report.refuse(&count.location, title, expected);
+        let expectation = format!("expected at most {max_count}, or ends farther apart");
+        return report.refuse(&count.location, title, expectation);
     }
     // A range in a design has its two ends as values; the design chooses the points between them.
     let from = from.value;

@@ -89,8 +89,8 @@ impl NumberTable {
         for (index, ((header, values), location)) in columns.into_iter().zip(locations).enumerate()
         {
             let known_name =
-                names.find_known_name(&header, None).unwrap_or_else(|[title, expected]| {
-                    report.refuse::<()>(&location, title, expected);
+                names.find_known_name(&header, None).unwrap_or_else(|[title, expectation]| {
+                    report.refuse::<()>(&location, title, expectation);
                     None
                 });
             let is_known = known_name.is_some();
@@ -306,9 +306,9 @@ pub(super) fn read(
         Ok(table_and_hash) => table_and_hash,
         Err(reason) => {
             let title = format!("cannot read the list of points {path_text}: {reason}");
-            let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
+            let expectation = "expected a CSV or Parquet file of numbers, one column a parameter, \
                 relative to this file";
-            return report.refuse(&location, title, expected);
+            return report.refuse(&location, title, expectation);
         }
     };
     let point_count =
@@ -321,8 +321,9 @@ pub(super) fn read(
     let has_unknown = table.columns.iter().any(|column| !column.is_known);
     if point_count == 0 && (has_parameter || !has_unknown) {
         let title = format!("the list of points {path_text} is empty");
-        let expected = "expected a line of parameter names, and under it a row of numbers a point";
-        return report.refuse(&location, title, expected);
+        let expectation = "expected a line of parameter names, and under it a row of numbers a \
+                           point";
+        return report.refuse(&location, title, expectation);
     }
     // Unknown names are reported when they are looked up.
     if !has_parameter && !has_unknown {

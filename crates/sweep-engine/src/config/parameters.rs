@@ -61,8 +61,8 @@ pub fn fix_point<M: Model>(at_arguments: &[String], draft: &mut Draft<'_, M>) ->
         } else if let Some(location) = draft.report.location(&format!("axis[{k}]")) {
             let name = &axis.parameter.name;
             let title = format!("a point of the grid needs a value of `{name}`");
-            let expected = format!("expected --at {name}=VALUE for this axis");
-            draft.report.refuse::<()>(&location, title, expected);
+            let expectation = format!("expected --at {name}=VALUE for this axis");
+            draft.report.refuse::<()>(&location, title, expectation);
         }
     }
     draft.plan.design = None;

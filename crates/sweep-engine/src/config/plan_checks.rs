@@ -47,10 +47,10 @@ pub fn refuse_numbers<M: Model>(
     draft: &Draft<'_, M>,
     title: String,
     keys: &[String],
-    expected: &str,
+    expectation: &str,
 ) {
     draft.report.push_with(|sources| {
-        let labels = once(expected).chain(repeat("and this"));
+        let labels = once(expectation).chain(repeat("and this"));
         let locations = find_locations(draft, keys, sources);
         locations
             .iter()
@@ -104,8 +104,8 @@ pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
     } else {
         return;
     };
-    let expected = format!("expected a step from {:e} s to {end} s", shortest_step_s(end_s));
-    let refusal = step_mistake(draft, title, &expected);
+    let expectation = format!("expected a step from {:e} s to {end} s", shortest_step_s(end_s));
+    let refusal = step_mistake(draft, title, &expectation);
     let end = draft.report.location("time.end_s").into_iter();
     draft
         .report
@@ -114,10 +114,14 @@ pub fn check_steps<M: Model>(draft: &Draft<'_, M>) {
 
 /// Returns the mistake of a step. It is at the step's location, or at the section if the file gives
 /// no step.
-pub fn step_mistake<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
+pub fn step_mistake<M: Model>(
+    draft: &Draft<'_, M>,
+    title: String,
+    expectation: &str,
+) -> Diagnostic {
     let step =
         draft.report.location("integrator.step_s").or_else(|| draft.report.location("integrator"));
     step.into_iter().fold(Diagnostic::new(title), |diagnostic, location| {
-        diagnostic.at_location(&location, expected)
+        diagnostic.at_location(&location, expectation)
     })
 }

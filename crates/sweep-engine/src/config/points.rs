@@ -56,8 +56,8 @@ where
             let title = format!("the table has no column {}", quote(name));
             let whole_header =
                 Location::new(source, 0..header_locations.last().map_or(0, |last| last.span.end));
-            let expected = "expected a column for every axis of the plan";
-            report.push(Diagnostic::new(title).at_location(&whole_header, expected));
+            let expectation = "expected a column for every axis of the plan";
+            report.push(Diagnostic::new(title).at_location(&whole_header, expectation));
         }
     }
     report.finish(Some(axis_columns))
@@ -80,11 +80,16 @@ pub fn wrong_length_mistake(
     column_mistake(names, column, title, format!("expected {first}, as the first column has"))
 }
 
-fn column_mistake(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
+fn column_mistake(
+    names: &[String],
+    column: usize,
+    title: String,
+    expectation: String,
+) -> Diagnostics {
     let report = Report::default();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let (_, header_locations) = report.add_header("table", &names);
-    report.push(Diagnostic::new(title).at_location(&header_locations[column], expected));
+    report.push(Diagnostic::new(title).at_location(&header_locations[column], expectation));
     report.into_diagnostics()
 }
 
@@ -106,10 +111,10 @@ fn value_off_axis<M: Model>(
         }
         Some(value) => {
             let title = format!("{description} = {value} is off the plan's axis");
-            let expected = format!("expected a number from {least} to {greatest}");
+            let expectation = format!("expected a number from {least} to {greatest}");
             let axis = &axis.parameter.name;
             Diagnostic::new(title)
-                .at_location(&name.location, expected)
+                .at_location(&name.location, expectation)
                 .with_help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
         }
     }
@@ -121,12 +126,12 @@ fn column_without_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagno
         return unknown_parameter(name, &error, &plan.model);
     }
     let axes: Vec<String> = plan.axes.iter().map(|axis| quote(&axis.parameter.name)).collect();
-    let expected = match axes.as_slice() {
+    let expectation = match axes.as_slice() {
         [] => "this plan has no [[axis]]".to_owned(),
         axes => format!("expected the plan's axes: {}", axes.join(", ")),
     };
     let title = format!("{} is no axis of this plan", quote(name.value));
-    Diagnostic::new(title).at_location(&name.location, expected).with_help(format!(
+    Diagnostic::new(title).at_location(&name.location, expectation).with_help(format!(
         "add [[axis]] with parameter = \"{}\" and the range that the table may cover",
         name.value
     ))

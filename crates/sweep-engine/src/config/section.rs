@@ -139,8 +139,8 @@ impl<'a> Section<'a> {
     }
 
     /// Returns a required value; a missing one is reported.
-    pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
-        self.report_if_missing(field, key, Some(expected)).into_located()
+    pub fn require<T>(&self, field: Field<T>, key: &str, expectation: &str) -> Option<Located<T>> {
+        self.report_if_missing(field, key, Some(expectation)).into_located()
     }
 
     /// Returns the field; a missing one is reported if a value is expected.
@@ -148,19 +148,19 @@ impl<'a> Section<'a> {
         &self,
         field: Field<T>,
         key: &str,
-        expected: Option<&str>,
+        expectation: Option<&str>,
     ) -> Field<T> {
-        if let (Field::Absent, Some(expected)) = (&field, expected) {
-            self.report_missing(key, expected);
+        if let (Field::Absent, Some(expectation)) = (&field, expectation) {
+            self.report_missing(key, expectation);
         }
         field
     }
 
     /// Reports a required key that is missing.
-    pub fn report_missing(&self, key: &str, expected: &str) {
+    pub fn report_missing(&self, key: &str, expectation: &str) {
         let title = format!("`{key}` is missing in {}", self.title);
         self.report.push_missing(
-            Diagnostic::new(title).at_location(&self.location, format!("expected {expected}")),
+            Diagnostic::new(title).at_location(&self.location, format!("expected {expectation}")),
         );
     }
 
@@ -181,7 +181,7 @@ impl<'a> Section<'a> {
         &self,
         description: &str,
         value: &Value<'_>,
-        expected: &str,
+        expectation: &str,
     ) -> Option<T> {
         let type_name = match value.get_ref() {
             DeValue::String(_) => "a string",
@@ -192,12 +192,12 @@ impl<'a> Section<'a> {
             DeValue::Array(_) => "an array",
             DeValue::Table(_) => "a table",
         };
-        let number_text = value.get_ref().as_str().filter(|_| expected.contains("number"));
+        let number_text = value.get_ref().as_str().filter(|_| expectation.contains("number"));
         let is_number = number_text.is_some_and(|number_text| number_text.parse::<f64>().is_ok());
         let quotes_advice = is_number.then_some("write the number without quotes");
         let refusal = Diagnostic::new(format!("{description} has the wrong type")).at_location(
             &self.locate(value.span()),
-            format!("expected {expected}, found {type_name}"),
+            format!("expected {expectation}, found {type_name}"),
         );
         self.report.push(quotes_advice.into_iter().fold(refusal, Diagnostic::with_help));
         None
@@ -219,8 +219,8 @@ impl<'a> Section<'a> {
                 let title = format!("`{key}` = {integer} is out of range");
                 let min = bounds.start();
                 let max = bounds.end();
-                let expected = format!("expected a whole number from {min} to {max}");
-                self.report.refuse(location, title, expected)
+                let expectation = format!("expected a whole number from {min} to {max}");
+                self.report.refuse(location, title, expectation)
             })
         })
     }

@@ -143,7 +143,7 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let key_description = Key::new("end_s", "end of the integration, s").settable();
     let key = key_description.required("the end of the integration in s");
     let end_schema = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
-    let (form, expected) = match &keys.walk {
+    let (form, expectation) = match &keys.walk {
         KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
         KeyWalk::Set(_) => (Form::Number(Range::Positive), ""),
         _ => (Form::Custom(&|_, _| Field::Absent, end_schema), ""),
@@ -158,7 +158,7 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
             keys.report()?.refuse(
                 &location,
                 title,
-                format!("expected {expected}at most {MAX_END_S:e} s"),
+                format!("expected {expectation}at most {MAX_END_S:e} s"),
             )
         },
     );
@@ -172,10 +172,10 @@ fn walk_time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     }
     let key_description = "amplitudes are taken from the first to the second time, s; the whole \
                            run if left out";
-    let expected = "expected two, [from, to], in s";
+    let expectation = "expected two, [from, to], in s";
     let form = Form::Numbers(NumberArray {
         location_keys: WINDOW_PARAMETERS.map(str::to_owned).to_vec(),
-        ..NumberArray::new(Range::NonNegative, 2..=2, expected)
+        ..NumberArray::new(Range::NonNegative, 2..=2, expectation)
     });
     let mut window_edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
     let window_field =

@@ -13,8 +13,8 @@ pub fn read_words(
 ) -> Field<Value> {
     section.texts(key).map(|list| {
         if list.value.is_empty() {
-            let expected = format!("expected at least one of `{}`", all.join("`, `"));
-            section.report.refuse::<()>(&list.location, format!("`{key}` is empty"), expected);
+            let expectation = format!("expected at least one of `{}`", all.join("`, `"));
+            section.report.refuse::<()>(&list.location, format!("`{key}` is empty"), expectation);
         }
         check_words(list.value, noun, all, section.report).0.into()
     })

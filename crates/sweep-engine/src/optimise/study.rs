@@ -245,9 +245,9 @@ fn read_parameters<M: Model>(
     let report = root.report;
     if sections.is_empty() || sections.len() as u64 > MAX_PARAMETERS {
         let title = format!("{} tables [[parameter]]", sections.len());
-        let expected =
+        let expectation =
             format!("expected from 1 to {}, each with name, from and to", MAX_PARAMETERS);
-        report.push_missing(Diagnostic::new(title).at_location(root.location(), expected));
+        report.push_missing(Diagnostic::new(title).at_location(root.location(), expectation));
     }
     let mut searched_parameters = Vec::new();
     for section in sections {
@@ -273,11 +273,11 @@ fn read_parameters<M: Model>(
                 if draft.is_some() && !has_free_dimension(design, draft) =>
             {
                 let title = "a tolerance without a design that spreads it";
-                let expected = format!(
+                let expectation = format!(
                     "expected a [design] in the grid file, by \"sobol\" over at most {MAX_AXES} \
                      axes and parameters, \"latin_hypercube\" or \"monte_carlo\""
                 );
-                report.refuse(&tolerance_field.location, title, expected)
+                report.refuse(&tolerance_field.location, title, expectation)
             }
             Field::Present(tolerance_field) => Some(tolerance_field.value),
             _ => Some(0.0),
@@ -356,14 +356,14 @@ fn read_objectives(
             .filter_map(|(text, sign)| Some((text?, sign)))
             .collect::<Vec<_>>()[..]
         else {
-            let expected = format!(
+            let expectation = format!(
                 "expected {}, and an expression",
                 format_choices(&OBJECTIVE_VERBS.map(|(v, _)| v))
             );
             root.report.refuse::<()>(
                 &location,
                 "an objective without an expression, or with two",
-                expected,
+                expectation,
             );
             continue;
         };
@@ -376,8 +376,8 @@ fn read_objectives(
                 "a number for each row, and every candidate has {} rows",
                 goals.rows_per_candidate
             );
-            let expected = "expected max(), min(), mean() or quantile() of it";
-            root.report.refuse::<()>(&text.location, title, expected);
+            let expectation = "expected max(), min(), mean() or quantile() of it";
+            root.report.refuse::<()>(&text.location, title, expectation);
         } else if objectives.iter().any(is_same_objective) {
             root.report.refuse::<()>(&text.location, "an objective twice", "expected each once");
         } else {

@@ -57,9 +57,9 @@ impl PointParts {
             let description = "number that an unfinished run knows the row by";
             columns.push(DeclaredColumn::new(ROW_INDEX_COLUMN, "1", description, CellType::Count));
         }
-        let parts = PartSchema::new(job, columns);
+        let part_schema = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
-        Self { part_schema: parts, layout, column_positions, points: job.points, chunk_points }
+        Self { part_schema, layout, column_positions, points: job.points, chunk_points }
     }
 
     /// Returns the number of chunks of the whole run.

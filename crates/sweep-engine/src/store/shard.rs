@@ -259,9 +259,11 @@ mod tests {
     use super::*;
 
     fn environment_of(
-        pairs: &'static [(&'static str, &'static str)],
+        variables: &'static [(&'static str, &'static str)],
     ) -> impl Fn(&str) -> Option<String> {
-        move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+        move |name| {
+            variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+        }
     }
 
     fn refusal_message(result: Result<Option<(Shard, ShardLayout)>, StoreError>) -> String {

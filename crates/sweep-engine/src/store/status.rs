@@ -74,8 +74,8 @@ pub(super) fn serialize_path<S: Serializer>(path: &Path, serializer: S) -> Resul
 /// The errors of [`super::OpenRun::open`] except [`StoreError::Busy`].
 pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
     let folder = Folder::new(output, &job.layout)?;
-    let parts = PointParts::new(job);
-    let chunks = parts.chunk_count();
+    let point_parts = PointParts::new(job);
+    let chunks = point_parts.chunk_count();
     let mut status = FolderStatus {
         output: output.to_path_buf(),
         points: job.points,
@@ -104,9 +104,9 @@ pub fn read_status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreEr
     }
     let mut complete_chunks = BTreeSet::new();
     for chunk in list_part_indices(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
-        let range = parts.chunk_range(chunk);
+        let range = point_parts.chunk_range(chunk);
         let mut by_status = NameCounts::new();
-        let points = read_part(&parts, &folder, chunk, |part| {
+        let points = read_part(&point_parts, &folder, chunk, |part| {
             part.add_status_counts(&mut by_status)?;
             Ok(part.point_count())
         });

@@ -108,8 +108,8 @@ pub(super) fn read_text_table(
             column.values.push(f64::NAN);
             report.push_with(|_| {
                 let title = format!("`{}` is not a number", shorten(cell));
-                let expected = "expected a number such as 0.25, 80 or 1e7";
-                Diagnostic::new(title).at_location(&Location::new(source, location), expected)
+                let expectation = "expected a number such as 0.25, 80 or 1e7";
+                Diagnostic::new(title).at_location(&Location::new(source, location), expectation)
             });
         }
     }
@@ -169,8 +169,8 @@ fn create_column(
     match names.find_known_name(header, unit) {
         Ok(Some(found)) => (make_column(found.name, true), Some(found.unit_scale)),
         Ok(None) => (make_column(header.to_owned(), false), None),
-        Err([title, expected]) => {
-            report.refuse::<()>(&location, title, expected);
+        Err([title, expectation]) => {
+            report.refuse::<()>(&location, title, expectation);
             (make_column(header.to_owned(), true), None)
         }
     }
@@ -192,8 +192,8 @@ fn row_length_mistake(
     let location = Location::new(source, line.text_start..line.text_start + line.text.len());
     let [names, numbers] = ["name", "number"].map(|noun| format_count(column_count, noun));
     let title = format!("a row of {} under {names}", format_count(cell_count, "number"));
-    let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
-    let mistake = Diagnostic::new(title).at_location(&location, expected);
+    let expectation = format!("expected {numbers}, separated by {}", separator_words(separator));
+    let mistake = Diagnostic::new(title).at_location(&location, expectation);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
     if separator == ',' && cell_count > column_count { mistake.with_help(help) } else { mistake }
@@ -246,9 +246,9 @@ fn notation_mistake(unclear: &UnclearNotation, source: SourceId) -> Diagnostic {
                 "no other number of the file shows its decimal mark: write {thousands}, or \
                  {decimals}0"
             );
-            let expected = "expected a number without separators of thousands";
+            let expectation = "expected a number without separators of thousands";
             Diagnostic::new(title)
-                .at_location(&evidence_location(evidence), expected)
+                .at_location(&evidence_location(evidence), expectation)
                 .with_help(help)
         }
     }

@@ -428,13 +428,13 @@ fn parts_of_another_plan_index_or_layout_are_foreign() {
 #[test]
 fn rows_that_do_not_fit_their_part_are_refused() {
     let job = synthetic::job(POINT_COUNT);
-    let parts = PointParts::new(&job);
+    let point_parts = PointParts::new(&job);
     let valid_rows = synthetic_rows(8..16);
     let encode_error = |synthetic_rows: &[PointRows]| {
-        parts.encode(&job, 1, synthetic_rows).unwrap_err().to_string()
+        point_parts.encode(&job, 1, synthetic_rows).unwrap_err().to_string()
     };
     for subset in [&valid_rows[..0], &valid_rows[1..2], &valid_rows] {
-        assert!(parts.encode(&job, 1, subset).is_ok());
+        assert!(point_parts.encode(&job, 1, subset).is_ok());
     }
     let reversed_rows: Vec<PointRows> = valid_rows.iter().rev().cloned().collect();
     assert!(encode_error(&reversed_rows).contains("8 outcomes that are not of its points"));
