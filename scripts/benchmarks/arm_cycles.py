@@ -25,14 +25,14 @@ import tempfile
 CORES = ["neoverse-n1", "neoverse-n2", "neoverse-v1", "neoverse-v2", "apple-m1", "ampere1"]
 LANES = {"scalar": 1, "neon": 2}
 # The address at which qemu 7 loads a position-independent program.
-BASE = 0x5500000000
+LOAD_ADDRESS = 0x5500000000
 # Number of traced instructions. The start of the program has fewer, and a step some 20,000.
 TRACED_COUNT = 4_000_000
 # Number of traced instructions, from the last one back, in which a step is searched.
 KEPT_COUNT = 200_000
 # Branches, which are left out because llvm-mca accepts only code without them.
-BRANCH = re.compile(r"(b|bl|br|blr|b\..*|cbz|cbnz|tbz|tbnz|ret|adr|adrp)\s")
-STACK = re.compile(r"(ld|st)\S*\s.*\[(sp|x29)")
+BRANCH_PATTERN = re.compile(r"(b|bl|br|blr|b\..*|cbz|cbnz|tbz|tbnz|ret|adr|adrp)\s")
+STACK_PATTERN = re.compile(r"(ld|st)\S*\s.*\[(sp|x29)")
 
 
 def disassemble(binary):
@@ -72,7 +72,7 @@ def trace_addresses(binary, simd, first, last):
                 "-D",
                 fifo,
             ]
-            + ["-dfilter", f"{BASE + first:#x}..{BASE + last:#x}", binary, simd],
+            + ["-dfilter", f"{LOAD_ADDRESS + first:#x}..{LOAD_ADDRESS + last:#x}", binary, simd],
             stdout=subprocess.DEVNULL,
         )
         with open(fifo) as trace:
@@ -80,11 +80,11 @@ def trace_addresses(binary, simd, first, last):
         run.kill()
         run.wait()
     address_matches = (re.search(r"\[[0-9a-f]+/([0-9a-f]+)/", line) for line in last_lines)
-    addresses = [int(address[1], 16) - BASE for address in address_matches if address]
+    addresses = [int(address[1], 16) - LOAD_ADDRESS for address in address_matches if address]
     if not addresses:
         sys.exit(
-            f"{binary} {simd} ran nothing between {BASE + first:#x} and {BASE + last:#x}: does "
-            f"this qemu load it at another address?"
+            f"{binary} {simd} ran nothing between {LOAD_ADDRESS + first:#x} and "
+            f"{LOAD_ADDRESS + last:#x}: does this qemu load it at another address?"
         )
     return addresses
 
@@ -127,10 +127,10 @@ def main():
     for simd, lanes in LANES.items():
         addresses = trace_addresses(binary, simd, first, last)
         executed_code = [code[address] for address in find_step(addresses)]
-        straight_code = "\n".join(line for line in executed_code if not BRANCH.match(line))
+        straight_code = "\n".join(line for line in executed_code if not BRANCH_PATTERN.match(line))
         table["instructions"][simd] = len(executed_code) / lanes
         table["of them loads and stores on the stack"][simd] = (
-            sum(bool(STACK.match(line)) for line in executed_code) / lanes
+            sum(bool(STACK_PATTERN.match(line)) for line in executed_code) / lanes
         )
         for core in CORES:
             table[core][simd] = predict_cycles(straight_code, core) / lanes

@@ -21,7 +21,7 @@ from kernel_profile import STEPS, build_benchmark
 LINE_BYTES = 64
 CACHES = {"32 KiB, 8 ways": (32768, 8), "48 KiB, 12 ways": (49152, 12)}
 # The instruction sets, with the divisor of the sizes of cache and lines.
-SETS = {"avx2": 1, "avx512": 2}
+SIZE_DIVISORS = {"avx2": 1, "avx512": 2}
 MODELS = ["Nonlinear", "Linear"]
 
 
@@ -47,11 +47,11 @@ def count_misses(binary, model, size_divisor, cache):
 
 def main():
     binary = sys.argv[1] if len(sys.argv) > 1 else build_benchmark()
-    models_and_sets = [(model, name) for name in SETS for model in MODELS]
+    models_and_sets = [(model, name) for name in SIZE_DIVISORS for model in MODELS]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         rows = [
             [
-                pool.submit(count_misses, binary, model, SETS[name], cache)
+                pool.submit(count_misses, binary, model, SIZE_DIVISORS[name], cache)
                 for cache in CACHES.values()
             ]
             for model, name in models_and_sets

@@ -48,7 +48,7 @@ values = [0.2, 0.4]
 SHARDS = 3 if IS_CHECK else 64
 ROUNDS = 1 if IS_CHECK else 3
 # The grid files of a map by the fast method and by plain rk4.
-FAST, PLAIN = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
+FAST_GRID, PLAIN_GRID = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
 SPEEDS = "240:260:10" if IS_CHECK else "210:350:1"
 # The numbers of unbalance masses in the grids of a million and of ten million rows.
 MASSES = (100, 300) if IS_CHECK else (1000, 10_000)
@@ -145,7 +145,7 @@ def measure_second_thread(sweep, folder):
     """Measures the gain by a second thread, and by a second process at the same time."""
 
     def measure_wall_s(threads, output_number=0):
-        words = ("run", f"sweeps/{FAST}.toml", "--threads", threads, "--progress", "none")
+        words = ("run", f"sweeps/{FAST_GRID}.toml", "--threads", threads, "--progress", "none")
         result = folder / f"second-{output_number}.parquet"
         return MeasuredCommand(sweep, *words, "--fresh", "--out", result).wall_s
 
@@ -162,7 +162,7 @@ def measure_second_thread(sweep, folder):
     return [
         ["a second thread", f"{thread_gain} times as quick ({format_number(one_thread_s)} s, "
          f"{format_number(two_threads_s)} s)",
-         f"`sweep run sweeps/{FAST}.toml --threads 1`, and 2"],
+         f"`sweep run sweeps/{FAST_GRID}.toml --threads 1`, and 2"],
         ["a second process at once, a thread each", f"{process_gain} times the "
          f"work ({format_number(two_processes_s)} s)", "the same, `--threads 1` twice"],
     ]
@@ -172,8 +172,8 @@ def measure_points(sweep, folder):
     """Measures the costs of points, and of files of a million and of ten million rows."""
     rows, points_per_core_s, main_thread_shares = [], [], []
     methods = {
-        "`rk4-mass-scaled`, accuracy 1e-3, checks included": f"run sweeps/{FAST}.toml",
-        "`rk4`, step 2e-4 s": f"run sweeps/{PLAIN}.toml",
+        "`rk4-mass-scaled`, accuracy 1e-3, checks included": f"run sweeps/{FAST_GRID}.toml",
+        "`rk4`, step 2e-4 s": f"run sweeps/{PLAIN_GRID}.toml",
     }
     for method, words in methods.items():
         wall_s, core_s, share = measure_threads(sweep, words, folder / "threads.parquet")
@@ -187,7 +187,7 @@ def measure_points(sweep, folder):
     rows.append(["chunks, hashes, syncs, progress and join",
                  ", ".join(main_thread_shares) + " of these times", "the same: the main thread"])
     rows += measure_second_thread(sweep, folder)
-    words, result = f"stability sweeps/{FAST}.toml --speed {SPEEDS}", folder / "speeds.parquet"
+    words, result = f"stability sweeps/{FAST_GRID}.toml --speed {SPEEDS}", folder / "speeds.parquet"
     stability = MeasuredCommand(sweep, *words.split(), "--out", result, "--fresh")
     rows.append([f"stability of {count_rows(result)} responses",
                  describe_run(stability, result.stat().st_size / 1e6), f"`sweep {words}`"])

@@ -36,7 +36,11 @@ STEPS = 200_000  # number of steps of the trajectory
 # Number of instants at which the thread is stopped, and of instructions from each.
 SAMPLES, INSTRUCTIONS = 8, 30_000
 # The instruction sets by name, with the processor's flag and the prefix of the registers.
-SETS = {"Scalar": ("fma", "xmm"), "Avx2": ("avx2", "ymm"), "Avx512": ("avx512dq", "zmm")}
+INSTRUCTION_SETS = {
+    "Scalar": ("fma", "xmm"),
+    "Avx2": ("avx2", "ymm"),
+    "Avx512": ("avx512dq", "zmm"),
+}
 # The kinds of arithmetic, with patterns of the mnemonics.
 KINDS = {
     "fused": r"vf\w*m(add|sub)",
@@ -108,9 +112,9 @@ def count_whole_steps(trace):
     addresses_by_count = collections.Counter(counts.values())
     min_addresses = 0.03 * len(counts)
     executions_per_sample = next(
-        n
-        for n in sorted(addresses_by_count)
-        if n > 1 and addresses_by_count[n] + addresses_by_count[n + 1] > min_addresses
+        count
+        for count in sorted(addresses_by_count)
+        if count > 1 and addresses_by_count[count] + addresses_by_count[count + 1] > min_addresses
     )
     mark_address = next(address for address in trace if counts[address] == executions_per_sample)
     first = trace.index(mark_address)
@@ -191,9 +195,9 @@ def build_benchmark():
         subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines(),
     )
     return next(
-        m["executable"]
-        for m in messages
-        if m.get("executable") and m["target"]["name"] == "kernels"
+        message["executable"]
+        for message in messages
+        if message.get("executable") and message["target"]["name"] == "kernels"
     )
 
 
@@ -209,7 +213,11 @@ def main():
         processor_info = file.read()
     ghz = options.ghz or measure_clock_ghz()
     flags = re.search(r"flags\s*: (.*)", processor_info)[1].split()
-    available_sets = {name: registers for name, (flag, registers) in SETS.items() if flag in flags}
+    available_sets = {
+        name: registers
+        for name, (flag, registers) in INSTRUCTION_SETS.items()
+        if flag in flags
+    }
     peaks_per_ns = {
         name: measure_fused_per_ns(registers) for name, registers in available_sets.items()
     }

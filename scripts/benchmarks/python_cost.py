@@ -18,7 +18,7 @@ import tempfile
 
 GRID = pathlib.Path(__file__).resolve().parent.parent.parent / "sweeps/fig12.toml"
 # A script that prints the processor time of a call of `plan.evaluate` (s).
-CALL = f"""
+CALL_SCRIPT = f"""
 import itertools, resource, numpy as np, washer_sweep
 plan = washer_sweep.Plan.from_toml({str(GRID)!r})
 points = np.array(list(itertools.product(np.linspace(0.05, 1, 39), np.linspace(60, 300, 33)))).T
@@ -32,7 +32,7 @@ ratios = result["ratio_max"]
 print(processor_time_s() - start_s)
 """
 # A script that prints the least times to check a table and to convert the columns (s).
-PARTS = f"""
+PARTS_SCRIPT = f"""
 import itertools, timeit, numpy as np, washer_sweep
 plan = washer_sweep.Plan.from_toml({str(GRID)!r})
 points = np.array(list(itertools.product(np.linspace(0.05, 1, 39), np.linspace(60, 300, 33)))).T
@@ -50,10 +50,10 @@ print(least_time_s(check), least_time_s(lambda: [result[name] for name in result
 """
 
 
-def run_measured(words):
+def run_measured(command):
     """Returns the processor time of a command (s) and its output."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    output = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, output
 
@@ -63,12 +63,13 @@ def main():
     sweep, rounds = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 5
     command_times_s, call_times_s = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for k in range(rounds):
-            out = pathlib.Path(folder, f"{k}.parquet")
-            words = [sweep, "run", GRID, "--out", out, "--progress", "none"]
-            command_times_s.append(run_measured(words)[0])
-            call_times_s.append(float(run_measured([sys.executable, "-c", CALL])[1]))
-    check_s, conversion_s = map(float, run_measured([sys.executable, "-c", PARTS])[1].split())
+        for round_number in range(rounds):
+            output_file = pathlib.Path(folder, f"{round_number}.parquet")
+            command = [sweep, "run", GRID, "--out", output_file, "--progress", "none"]
+            command_times_s.append(run_measured(command)[0])
+            call_times_s.append(float(run_measured([sys.executable, "-c", CALL_SCRIPT])[1]))
+    part_times = run_measured([sys.executable, "-c", PARTS_SCRIPT])[1]
+    check_s, conversion_s = map(float, part_times.split())
     command_s, call_s = statistics.median(command_times_s), statistics.median(call_times_s)
     print(f"sweep run      {command_s:.2f} s of processor time "
           f"(of {rounds}: {min(command_times_s):.2f} to {max(command_times_s):.2f})")

@@ -49,7 +49,8 @@ def count_lines(text):
 
 
 def main(arguments):
-    root = pathlib.Path(next((a for a in arguments if not a.startswith("-")), THIS_PROJECT))
+    folders = [argument for argument in arguments if not argument.startswith("-")]
+    root = pathlib.Path(folders[0] if folders else THIS_PROJECT)
     total = 0
     for crate in sorted((root / "crates").iterdir()):
         concerns = {}

@@ -95,14 +95,14 @@ def loaded_spring_lengths(sweep: str) -> list[str]:
 def grid_with_ramp(ramp_s: float) -> str:
     """Returns the grid with another ramp. Speeds in its window are the same."""
     text = GRID.read_text()
-    for old, new in [
+    for old_text, new_text in [
         (f"ramp_s = {RAMP_S}", f"ramp_s = {ramp_s}"),
         (f"end_s = {RAMP_S}", f"end_s = {ramp_s}"),
         ("window_s = [30.0, 50.0]", f"window_s = [{0.6 * ramp_s}, {ramp_s}]"),
     ]:
-        if text.count(old) != 1:
-            sys.exit(f"{GRID} must have `{old}` once")
-        text = text.replace(old, new)
+        if text.count(old_text) != 1:
+            sys.exit(f"{GRID} must have `{old_text}` once")
+        text = text.replace(old_text, new_text)
     return text
 
 

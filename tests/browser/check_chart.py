@@ -11,7 +11,7 @@ import bisect
 import itertools
 
 import pyarrow.parquet as pq
-from check_page import CTRL, Page, check, check_self_contained, is_same, parse_number
+from check_page import CONTROL_KEY, Page, check, check_self_contained, is_same, parse_number
 from selenium.webdriver.common.by import By
 
 # The channels and their names on the page, with the factors and the units of their values.
@@ -162,7 +162,7 @@ def check_boxes_and_zoom(page):
     initial_picture = page.picture_hash()
     bounds = page.bounds()
     position = (bounds["left"] + bounds["width"] / 2, bounds["top"] + 150)
-    page.send_mouse_event("mouseWheel", *position, deltaX=0, deltaY=-600, modifiers=CTRL)
+    page.send_mouse_event("mouseWheel", *position, deltaX=0, deltaY=-600, modifiers=CONTROL_KEY)
     page.wait(lambda: page.picture_hash() != initial_picture, "Ctrl and the wheel do not zoom")
     page.save_screenshot("chart-zoomed")
     for count in (1, 2):

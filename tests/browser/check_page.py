@@ -37,7 +37,7 @@ FLAGS = [
 
 
 # The modifier of an input event for the control key.
-CTRL = 2
+CONTROL_KEY = 2
 
 # The beginnings of the names of columns without a picture.
 UNDRAWN_COLUMNS = ("point", "steps_", "rejected_")
@@ -84,8 +84,8 @@ class Map:
         ratio."""
         sample = self.first_cut_rows[:: max(1, len(self.first_cut_rows) // 12)]
         sample += [row for row in self.first_cut_rows if row["status"] != "ok"][:1]
-        ok = [row for row in self.first_cut_rows if row["status"] == "ok"]
-        return sample + [row for row in ok if row["ratio_max"] is None][:1]
+        ok_rows = [row for row in self.first_cut_rows if row["status"] == "ok"]
+        return sample + [row for row in ok_rows if row["ratio_max"] is None][:1]
 
 
 class Page:
@@ -154,10 +154,10 @@ class Page:
         script = "return document.getElementById('data').textContent"
         return json.loads(self.driver.execute_script(script))
 
-    def check_console(self, when):
+    def check_console(self, occasion):
         """Checks that nothing was written to the console."""
         entries = self.driver.get_log("browser")
-        check(not entries, f"the console after {when}: {entries}")
+        check(not entries, f"the console after {occasion}: {entries}")
 
     def save_screenshot(self, name):
         """Saves a picture of the window, if a folder is given."""
@@ -194,13 +194,13 @@ class Page:
                 event["text"] = key
             self.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
 
-    def window_position(self, x, y, log):
+    def window_position(self, x, y, is_log):
         """Returns the current position of axis values in the window."""
         rectangle = "return document.querySelector('#map canvas').getBoundingClientRect().toJSON()"
         bounds = self.driver.execute_script(rectangle)
         left, top, width, height = map(float, self.figure().get_attribute("data-area").split())
         x0, x1, y0, y1 = map(float, self.figure().get_attribute("data-view").split())
-        x, y = (math.log(value) if by_log else value for value, by_log in zip((x, y), log))
+        x, y = (math.log(value) if by_log else value for value, by_log in zip((x, y), is_log))
         return (
             bounds["left"] + left + width * (x - x0) / (x1 - x0),
             bounds["top"] + top + height * (1 - (y - y0) / (y1 - y0)),
@@ -220,21 +220,21 @@ def is_same(page_value, file_value):
     return abs(page_value - file_value) <= 6e-4 * abs(file_value)
 
 
-def check_hovering(page, data, log, when):
+def check_hovering(page, data, is_log, occasion):
     """Checks the page's values at points all over the map."""
     lines = page.driver.execute_script("return DATA.rows")
     kinds = ("ratio_", "nonlinear_", "linear_")
     other_columns = [column for column in data.factors if not column.startswith(kinds)]
     for row in data.sample_rows():
-        position = page.window_position(row[data.axes[0]], row[data.axes[1]], log)
+        position = page.window_position(row[data.axes[0]], row[data.axes[1]], is_log)
         page.send_mouse_event("mouseMoved", *position)
         expected = f"Point {row['point']}"
         page.wait(lambda: page.text("readout").startswith(expected),
-                  f"{when}: hovering never showed {expected}")
+                  f"{occasion}: hovering never showed {expected}")
         readout = page.text("readout")
         largest_ratio = page.text("ratio").removeprefix("Largest ratio ").split(" ")[0]
         check(is_same(parse_number(largest_ratio), row["ratio_max"]),
-              f"{when}: {expected}: {largest_ratio} for {row['ratio_max']}")
+              f"{occasion}: {expected}: {largest_ratio} for {row['ratio_max']}")
         for channel in data.channels:
             for kind in ("nonlinear", "linear", "ratio"):
                 selector = f'#readout tr[data-channel="{channel}"] td[data-kind="{kind}"]'
@@ -243,7 +243,7 @@ def check_hovering(page, data, log, when):
                 if file_value is not None and kind != "ratio":
                     file_value *= 1000
                 check(is_same(parse_number(text), file_value),
-                      f"{when}: {expected}, {kind} {channel}: {text} for {file_value}")
+                      f"{occasion}: {expected}, {kind} {channel}: {text} for {file_value}")
         names_and_kinds = {column: (line["name"], kind) for line in lines
                 for kind, column in zip(("nonlinear", "linear"), line["columns"]) if column}
         for column in other_columns:
@@ -252,18 +252,18 @@ def check_hovering(page, data, log, when):
             text = page.driver.find_element(By.CSS_SELECTOR, selector).text
             file_value = None if row[column] is None else data.factors[column] * row[column]
             check(is_same(parse_number(text), file_value),
-                  f"{when}: {expected}, {column}: {text} for {file_value}")
+                  f"{occasion}: {expected}, {column}: {text} for {file_value}")
         if row["status"] != "ok":
             check(f"Failed: {row['status'].replace('_', ' ')}" in readout,
-                  f"{when}: {expected} hides its status: {readout}")
+                  f"{occasion}: {expected} hides its status: {readout}")
         elif row["reliable"] is not None:
             verdict = "Linear model reliable" if row["reliable"] else "Linear model unreliable"
-            check(verdict in readout, f"{when}: {expected}: not '{verdict}': {readout}")
+            check(verdict in readout, f"{occasion}: {expected}: not '{verdict}': {readout}")
     values = 3 * len(data.channels) + len(other_columns)
-    return f"{when}: {len(data.sample_rows())} points, {values} values each"
+    return f"{occasion}: {len(data.sample_rows())} points, {values} values each"
 
 
-def check_switches(page, data, log):
+def check_switches(page, data, is_log):
     """Checks that each column has its own picture, and that the tip has its value."""
     quantity = Select(page.driver.find_element(By.ID, "quantity"))
     row = next(row for row in data.sample_rows() if row["ratio_max"] is not None)
@@ -274,7 +274,7 @@ def check_switches(page, data, log):
     for column in columns:
         quantity.select_by_value(column)
         page.send_mouse_event("mouseMoved", 5, 5)
-        position = page.window_position(row[data.axes[0]], row[data.axes[1]], log)
+        position = page.window_position(row[data.axes[0]], row[data.axes[1]], is_log)
         page.send_mouse_event("mouseMoved", *position)
         page.wait(lambda: page.text("tip"), f"{column}: no tip at the pointer")
         pictures[column] = (page.picture_hash(), [row[column] for row in data.first_cut_rows])
@@ -294,19 +294,19 @@ def check_switches(page, data, log):
     return f"{len(pictures)} pictures, each redrawn, each with its value at the pointer"
 
 
-def check_zoom(page, data, log):
+def check_zoom(page, data, is_log):
     """Checks that wheel, drag and double-click change the view, and that values remain correct."""
     view = lambda: page.figure().get_attribute("data-view")  # noqa: E731
     initial_view = view()
     middle = [values[len(values) // 2] for values in data.values[:2]]
     page.driver.execute_script("scrollTo(0, 0)")
-    position = page.window_position(*middle, log)
+    position = page.window_position(*middle, is_log)
     page.send_mouse_event("mouseWheel", *position, deltaX=0, deltaY=-200)
     page.wait_for_frame()
     check(view() == initial_view, "the wheel alone zooms: the page cannot be scrolled over the map")
-    page.send_mouse_event("mouseWheel", *position, deltaX=0, deltaY=-600, modifiers=CTRL)
+    page.send_mouse_event("mouseWheel", *position, deltaX=0, deltaY=-600, modifiers=CONTROL_KEY)
     page.wait(lambda: view() != initial_view, "Ctrl and the wheel did not zoom")
-    zoomed_position = page.window_position(*middle, log)
+    zoomed_position = page.window_position(*middle, is_log)
     # The browser rounds the pointer's position to a pixel; zooming enlarges the error.
     distance_px = math.dist(position, zoomed_position)
     check(distance_px < 3.0,
@@ -322,7 +322,7 @@ def check_zoom(page, data, log):
     page.send_mouse_event("mouseMoved", *end, button="left", buttons=1)
     page.send_mouse_event("mouseReleased", *end, button="left", clickCount=1)
     page.wait(lambda: view() != zoomed, "dragging did not move the view")
-    moved = math.dist(page.window_position(*middle, log), (position[0] + 60, position[1] + 40))
+    moved = math.dist(page.window_position(*middle, is_log), (position[0] + 60, position[1] + 40))
     check(moved < 4.0, f"the map did not follow the pointer: {moved:.1f} px apart")
     for count in (1, 2):
         page.send_mouse_event("mousePressed", *position, button="left", clickCount=count)
@@ -365,14 +365,14 @@ def check_keys(page, data):
     return "arrows, zoom and reset; what is read is announced"
 
 
-def check_histories(page, data, log):
+def check_histories(page, data, is_log):
     """Checks that a click on a point with time histories shows them."""
     traces = page.data()["traces"]
     if traces is None:
         return "no traces beside this map"
     row = next(row for row in data.first_cut_rows if str(row["point"]) in traces)
     page.driver.execute_script("scrollTo(0, 0)")
-    position = page.window_position(row[data.axes[0]], row[data.axes[1]], log)
+    position = page.window_position(row[data.axes[0]], row[data.axes[1]], is_log)
     page.send_mouse_event("mouseMoved", *position)
     page.send_mouse_event("mousePressed", *position, button="left", clickCount=1)
     page.send_mouse_event("mouseReleased", *position, button="left", clickCount=1)
@@ -409,10 +409,10 @@ def check_widths_and_schemes(page):
         check(page_width <= width, f"at {width} px the page is {page_width} px wide")
         check(width > 400 or map_width > 280, f"at {width} px the map is {map_width} px wide")
         page.save_screenshot(f"{width}-{scheme}")
-        for k, what in enumerate(("page", "map")):
+        for k, picture_name in enumerate(("page", "map")):
             other = pictures.get((width, "light"))
             check(scheme == "light" or other[k] != pictures[width, scheme][k],
-                  f"the {what} is the same in light and dark at {width} px")
+                  f"the {picture_name} is the same in light and dark at {width} px")
     return "400 and 1400 px, light and dark"
 
 
@@ -438,7 +438,7 @@ def check_report_and_downloads(page, data):
         page.wait((folder / name).exists, f"{button} saves no {name}")
     lines = (folder / downloads["numbers"]).read_text().split()
     numbers = dict(line.split(",") for line in lines)
-    for name in ("ratio_max", *data.axes, *(f"nonlinear_{of}" for of in data.channels)):
+    for name in ("ratio_max", *data.axes, *(f"nonlinear_{channel}" for channel in data.channels)):
         check(is_same(float(numbers[name]), worst_row[name]), f"saved {name}: {numbers[name]}")
     check((folder / "map.png").read_bytes()[:4] == b"\x89PNG", "the picture is no PNG")
     page.press_key("+")
@@ -495,21 +495,21 @@ def main():
     parser.add_argument("--screenshots", help="folder for screenshots")
     arguments = parser.parse_args()
     data = Map(arguments.map)
-    started = time.monotonic()
+    start_s = time.monotonic()
     page = Page(arguments.page, arguments.screenshots)
-    log = [axis["log"] for axis in page.data()["axes"]]
+    is_log = [axis["log"] for axis in page.data()["axes"]]
     page.run([
         ("alone", lambda: check_self_contained(page)),
-        ("hover", lambda: check_hovering(page, data, log, "as opened")),
-        ("switch", lambda: check_switches(page, data, log)),
-        ("zoom", lambda: check_zoom(page, data, log)),
+        ("hover", lambda: check_hovering(page, data, is_log, "as opened")),
+        ("switch", lambda: check_switches(page, data, is_log)),
+        ("zoom", lambda: check_zoom(page, data, is_log)),
         ("keys", lambda: check_keys(page, data)),
-        ("histories", lambda: check_histories(page, data, log)),
+        ("histories", lambda: check_histories(page, data, is_log)),
         ("report", lambda: check_report_and_downloads(page, data)),
         ("widths", lambda: check_widths_and_schemes(page)),
         ("speed", lambda: measure_redraw(page)),
     ])
-    print(f"{len(data.rows)} points checked in {time.monotonic() - started:.0f} s")
+    print(f"{len(data.rows)} points checked in {time.monotonic() - start_s:.0f} s")
 
 
 if __name__ == "__main__":

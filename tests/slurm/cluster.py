@@ -21,7 +21,9 @@ class Cluster:
         self.munge = folder / "munge"
         self.processes: dict[str, subprocess.Popen] = {}
         self.environment = {
-            k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "SBATCH_"))
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("SLURM_", "SBATCH_"))
         }
         self.environment["SLURM_CONF"] = str(folder / "slurm.conf")
 
@@ -198,11 +200,11 @@ class Cluster:
 
 def free_ports(count: int) -> list[int]:
     sockets = [socket.socket() for _ in range(count)]
-    for s in sockets:
-        s.bind(("127.0.0.1", 0))
-    ports = [s.getsockname()[1] for s in sockets]
-    for s in sockets:
-        s.close()
+    for opened_socket in sockets:
+        opened_socket.bind(("127.0.0.1", 0))
+    ports = [opened_socket.getsockname()[1] for opened_socket in sockets]
+    for opened_socket in sockets:
+        opened_socket.close()
     return ports
 
 
@@ -227,7 +229,7 @@ def parent(pid: int) -> int:
 
 def descendants(pid: int) -> list[int]:
     children = [child for child, _ in processes() if parent(child) == pid]
-    return [p for child in children for p in [child, *descendants(child)]]
+    return [process_id for child in children for process_id in [child, *descendants(child)]]
 
 
 def environment(pid: int) -> dict[str, str]:
@@ -239,7 +241,11 @@ def environment(pid: int) -> dict[str, str]:
 
 
 def environment_of_descendants(pid: int) -> set[str]:
-    return {f"{k}={v}" for child in descendants(pid) for k, v in environment(child).items()}
+    return {
+        f"{name}={value}"
+        for child in descendants(pid)
+        for name, value in environment(child).items()
+    }
 
 
 def kill(pid: int):
