@@ -7,7 +7,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 file=crates/sweep/src/identity.rs
 version=$(sed -n 's/^pub const NUMERICS_VERSION: u32 = \([0-9]*\);$/\1/p' "$file")
-sed "/^pub const NUMERICS_VERSION/s/$version;$/$((now + 1));/" "$file" > "$file.new"
+sed "/^pub const NUMERICS_VERSION/s/$version;$/$((version + 1));/" "$file" > "$file.new"
 mv "$file.new" "$file"
 UPDATE_GOLDENS=1 cargo test --release -p sweep --test command goldens
-echo "numerics $version -> $((now + 1)); commit $file, tests/goldens.json and tests/goldens.csv"
+echo "numerics $version -> $((version + 1)); commit $file, tests/goldens.json and tests/goldens.csv"

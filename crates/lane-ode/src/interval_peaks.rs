@@ -44,8 +44,8 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
         self.interval_end_s.0.set(lane, first_division_s);
     }
 
-    /// Returns the peaks of the parts of one lane and ends its trajectory. The last part may be
-    /// incomplete.
+    /// Returns the peaks of the intervals of one lane and ends its trajectory. The last interval
+    /// may be incomplete.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.interval_end_s.0.set(lane, f64::INFINITY);
         let mut lane_peaks = core::mem::take(&mut self.completed_peaks[lane]);
@@ -72,10 +72,10 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
         let mut remaining_s = length_s;
         loop {
             let is_divided_mask = self.interval_end_s.0.less(end_s.0);
-            let divided_lanes = T::bits(is_divided_mask);
+            let lanes_with_division = T::bits(is_divided_mask);
             let mut part_end_samples = *samples;
             let mut part_length_s = remaining_s;
-            if divided_lanes != 0 {
+            if lanes_with_division != 0 {
                 // Lanes without a division time in the step advance to the step's end at once.
                 let time_to_division_s = self.interval_end_s - (end_s - remaining_s);
                 let fraction = N(T::select(
@@ -108,11 +108,11 @@ impl<T: Lane, const M: usize> IntervalPeaks<T, M> {
                 part_length_s = (fraction * remaining_s).v();
             }
             self.peaks.advance(part_length_s, &part_end_samples, counted_lanes);
-            if divided_lanes == 0 {
+            if lanes_with_division == 0 {
                 return;
             }
             remaining_s -= part_length_s;
-            for lane in (0..T::LANES).filter(|lane| divided_lanes >> lane & 1 == 1) {
+            for lane in (0..T::LANES).filter(|lane| lanes_with_division >> lane & 1 == 1) {
                 self.completed_peaks[lane].push(self.peaks.lane_peaks(lane));
                 self.peaks.reset(lane);
                 let next_division_s = self.division_times_s[lane].pop().unwrap_or(f64::INFINITY);

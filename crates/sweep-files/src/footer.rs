@@ -1,5 +1,5 @@
-//! Checks a Parquet file's footer before the library reads it, because the library trusts it;
-//! `thrift` says where.
+//! Checks a Parquet file's footer before the library reads it, because the library trusts the
+//! counts and sizes in it. The module `thrift` names the places where it does.
 
 use bytes::Bytes;
 use parquet::errors::ParquetError;

@@ -133,8 +133,8 @@ impl Cuts {
     }
 }
 
-/// Returns the indices of the values shown for each axis: the fixed value if not all values fit, or
-/// else `counts` of them, evenly picked.
+/// Returns the indices of the values that figures show for each axis: as many evenly picked values
+/// as `counts` says, or only the fixed value of an axis that has one and more values than that.
 fn pick_values(
     further_axes: &[SweptAxis],
     fixed_indices: &[Option<usize>],

@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn an_independent_quantity_correlates_less_than_by_chance() {
-        // Multiples of nearly the golden section modulo 1 have no order left.
+        // Fractional parts of multiples of the golden ratio are unrelated to the order of x.
         let x = rising_numbers(400);
         let y: Vec<f64> = x.iter().map(|x| (x * 0.618_033_988_749_895).fract()).collect();
         let influence = RankInfluence::new(&x, &y).unwrap();

@@ -105,7 +105,7 @@ const VARIED_ELEMENTS: [(&str, f64, f64); 17] = [
     ("foot_2_z_m", -0.26, 0.1),
 ];
 
-/// The kind of a trial: the variation of a grid besides the machine's proportions.
+/// The kind of a trial: the inputs of a grid that vary in addition to the machine's proportions.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum TrialKind {
     Plain,
@@ -284,10 +284,11 @@ fn relative_row_difference(plan: &Plan, a: &MapRow, b: &MapRow) -> f64 {
     greatest_difference(plan, a, b).1
 }
 
-/// Returns the number of two rows with the greatest relative difference, and that difference.
+/// Returns the name of the quantity with the greatest relative difference between two rows, and
+/// that difference.
 fn greatest_difference(plan: &Plan, a: &MapRow, b: &MapRow) -> (String, f64) {
     let mut differences = metric_differences(plan, a, b);
-    // Gaps and ends are those of the whole run, which goes on after the window.
+    // Least gaps and times of failure are those of the whole run, which goes on after the window.
     let clearance_m = plan.model.machine.radial_clearance_m;
     for model in MODELS {
         differences.push((format!("amplitudes {model}"), amplitude_difference(model, a, b)));

@@ -126,7 +126,7 @@ impl<'a> ModelEngine<'a> {
             purpose: OutcomePurpose::Row,
             required_simd: forced,
             timing,
-            row_rule: plan_row_rule(plan),
+            row_rule: make_row_rule(plan),
             levels,
         }
     }
@@ -284,7 +284,7 @@ impl<'a> ModelEngine<'a> {
 }
 
 /// Returns the measures that rows take from the trajectories of a plan, and the accuracy required.
-pub(crate) fn plan_row_rule(plan: &Plan) -> RowRule {
+pub(crate) fn make_row_rule(plan: &Plan) -> RowRule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
         // A single method has no accuracy to reach.

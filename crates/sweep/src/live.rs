@@ -13,7 +13,7 @@ use washer_plot::{Live, Slider};
 use washer_row::{MethodKind, Metric, MetricColumn};
 
 use crate::config::WasherGridInput;
-use crate::engine::{CHECKPOINT_COUNT, ModelEngine, plan_row_rule};
+use crate::engine::{CHECKPOINT_COUNT, ModelEngine, make_row_rule};
 use crate::method::rk4_mass_scaled;
 use crate::model::Washer;
 use crate::plan::{
@@ -269,7 +269,7 @@ fn plan_with_sliders(plan: &Plan, sliders: &[Axis]) -> Plan {
 /// Returns the setup, and a description of each model's refinement levels.
 fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
     // A page uses the fast method, with the accuracy of the map's method if it has one.
-    let map_accuracy = plan_row_rule(plan).accuracy;
+    let map_accuracy = make_row_rule(plan).accuracy;
     let accuracy = if map_accuracy.is_finite() { map_accuracy } else { ACCURACY.default };
     let plan = &Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let levels = ModelEngine::new(plan)?.levels().clone();
@@ -283,7 +283,7 @@ fn build_setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]
         machine: plan.model.machine.clone(),
         spin: plan.model.spin.clone(),
         checkpoints: CHECKPOINT_COUNT,
-        rule: plan_row_rule(plan),
+        rule: make_row_rule(plan),
         sliders: Sliders { parameters, axis_count: plan.axes.len() },
         levels,
         wide_levels,

@@ -185,14 +185,14 @@ pub(crate) fn tub_tangents<T: Lane>(
 /// Transforms the slopes of generalised forces from the bearing midpoint to the mass centre, with
 /// the equilibrium's arms: the inverse of `FloatingChain::generalised_forces`.
 #[inline(always)]
-fn transform_to_mass_centre<T: Real, const R: usize, const ROWS: usize>(
-    (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
-    arm: &[[N<T>; 2]; R],
+fn transform_to_mass_centre<T: Real, const ROTATIONS: usize, const ROWS: usize>(
+    (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; ROTATIONS]),
+    arm: &[[N<T>; 2]; ROTATIONS],
 ) -> [N<T>; ROWS] {
     let force = [N(midpoint[0].0.slope), N(midpoint[1].0.slope)];
     let mut rows = [force[0]; ROWS];
     rows[1] = force[1];
-    for r in 0..R {
+    for r in 0..ROTATIONS {
         rows[2 + r] = N(rotation[r].0.slope) - arm[r][0] * force[0] - arm[r][1] * force[1];
     }
     rows

@@ -46,7 +46,7 @@ const INITIAL_PERTURBATION: f64 = 1e-10;
 ///
 /// Basis: rounding of an equilibrium leaves about 1e-15 of the clearance, and a billionth of it has
 /// no effect on any machine. Doubling it changes no row.
-const REST_DEVIATION_SHARE: f64 = 1e-9;
+const REST_DEVIATION_PER_CLEARANCE: f64 = 1e-9;
 
 /// The error of a machine without a stable static equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -156,7 +156,7 @@ impl Point {
 
     /// Returns the greatest deviation of a machine at rest (m; rad for angles).
     pub fn rest_limit_m(&self) -> f64 {
-        REST_DEVIATION_SHARE * self.clearance_m()
+        REST_DEVIATION_PER_CLEARANCE * self.clearance_m()
     }
 
     /// Returns the edges of the window (s).
@@ -391,9 +391,9 @@ pub(crate) fn plan_segments(spin_segments: &[SpinSegment], timing: &Timing) -> V
     let [from, to] = timing.window_s;
     let boundary_times_s =
         spin_segments.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
-    let part_count = f64::from(timing.checkpoints);
+    let checkpoint_count = f64::from(timing.checkpoints);
     let boundary_times_s = boundary_times_s
-        .chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / part_count)));
+        .chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / checkpoint_count)));
     let mut sorted_times_s: Vec<f64> =
         boundary_times_s.filter(|t| (0.0..=timing.end_s).contains(t)).collect();
     sorted_times_s.sort_by(f64::total_cmp);

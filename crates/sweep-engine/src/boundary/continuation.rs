@@ -147,8 +147,8 @@ impl LinePair<'_> {
     }
 
     /// Returns the neighbour's intervals, moved to the positions that they should have on this
-    /// line: on the straight line through both neighbours' crossings, or else as far as the nearest
-    /// crossing that this line and the neighbour share.
+    /// line: on the straight line through both neighbours' crossings. Without a second neighbour
+    /// they move by the distance of the nearest crossing that this line and the neighbour share.
     fn shift_neighbour_intervals(&self, span: &Span) -> Vec<SideInterval> {
         let second_neighbour = self
             .second_neighbour
@@ -261,12 +261,12 @@ mod tests {
 
     fn find_disputed(
         own_crossings: &[f64],
-        neighbour: &[f64],
-        second_neighbour: Option<&[f64]>,
+        neighbour_crossings: &[f64],
+        second_neighbour_crossings: Option<&[f64]>,
     ) -> Vec<[f64; 2]> {
         let own_crossings = intervals(own_crossings);
-        let neighbour = intervals(neighbour);
-        let second_neighbour = second_neighbour.map(intervals);
+        let neighbour = intervals(neighbour_crossings);
+        let second_neighbour = second_neighbour_crossings.map(intervals);
         let pair = LinePair {
             line: Neighbour { position: 3.0, intervals: &own_crossings },
             neighbour: Neighbour { position: 2.0, intervals: &neighbour },

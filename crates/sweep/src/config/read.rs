@@ -36,7 +36,8 @@ pub(crate) fn walk_reliability(measures: &mut Measures, keys: &mut Keys<'_>) {
     let description = "amplitudes by which the models are compared: largest deviations, the same \
                  turn by turn of the drum, or root mean squares";
     let criterion = &mut measures.criterion;
-    // A plan with the default criterion omits it, so that its hash stays the same.
+    // The description of a plan omits the default criterion, so that plans of files without the
+    // key and of files that name the default have the same hash.
     if !matches!(keys.walk, KeyWalk::Describe(_))
         || keys.is_schema()
         || *criterion != Criterion::default()

@@ -134,7 +134,7 @@ impl<T: Lane> StepConstants<T> {
     }
 }
 
-/// The rotor's arrays at one instant.
+/// The inertia, gyroscopic terms and bearings of the rotor at one instant, in its angle's axes.
 #[derive(Clone, Copy)]
 pub(crate) struct RotorArrays<T> {
     entries: [N<T>; ENTRIES],
@@ -361,7 +361,7 @@ pub(crate) fn solve_implicit_stage<T: Lane>(
     r: &[N<T>; STATES],
     g: N<T>,
 ) -> [N<T>; STATES] {
-    // The coordinates at r + g k without the term g^2 a.
+    // The coordinates of r + g k without the share of the accelerations a, which is g^2 a.
     let mut predicted_coordinates = *q;
     for i in 0..COORDINATES {
         predicted_coordinates[i] = r[i] + g * r[COORDINATES + i];

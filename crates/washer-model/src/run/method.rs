@@ -14,8 +14,8 @@ sweep_parameter::named! {
     /// The kinds of methods. The position in this list is the code in results and pages, so that
     /// new kinds are added at the end.
     ///
-    /// Capped kinds integrate by the model's formula ([`Formula::for_model`]) the machine with
-    /// scaled mass at the bearings, and at the hinge if that has a cap, so that none of their modes
+    /// Capped kinds integrate the machine by the model's formula ([`Formula::for_model`]). The mass
+    /// at the bearings, and at the hinge if that has a cap, is scaled so that none of their modes
     /// is faster than its cap (section 4.3 of the model page).
     #[derive(Default)]
     pub enum MethodKind {

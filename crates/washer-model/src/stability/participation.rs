@@ -95,12 +95,12 @@ pub(super) fn modal_energies(
         let mode = &frozen_modes.modes[column / 2];
         let [re, im] = mode.shape[i % COORDINATES];
         let is_speed = i >= COORDINATES;
-        let is_second = column % 2 == 1;
+        let is_second_of_pair = column % 2 == 1;
         if mode.im_rad_per_s == 0.0 {
-            let component = if is_speed == is_second { re } else { 0.0 };
+            let component = if is_speed == is_second_of_pair { re } else { 0.0 };
             return c64::new(component, 0.0);
         }
-        let sign = if is_second { -1.0 } else { 1.0 };
+        let sign = if is_second_of_pair { -1.0 } else { 1.0 };
         let entry = c64::new(re, sign * im);
         let s = c64::new(mode.re_per_s, sign * mode.im_rad_per_s);
         if is_speed { entry * s / unit_per_s } else { entry }

@@ -58,8 +58,8 @@ const SEPARATE_GUESS_DISTANCE: f64 = 10.0 * SAME_RESPONSE_DISTANCE;
 const MAX_DAMPED_STEP: f64 = 0.2 * MAX_GUESS_DISTANCE;
 
 /// The factor by which the suspension's slowest transient decays before Newton's method starts, if
-/// no curve has a response at the speed. Basis: Newton's method converges from a thousandth of a
-/// motion. Doubling it makes the integration a tenth shorter.
+/// no curve has a response at the speed. Basis: Newton's method converges from an error of a
+/// thousandth of the motion. Doubling it makes the integration a tenth shorter.
 const TRANSIENT_DECAY: f64 = 1e-3;
 
 /// The longest integration of a transient (s). Basis: modes with a decay of at least 0.06/s reach
