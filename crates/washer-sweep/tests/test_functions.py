@@ -6,7 +6,6 @@ import pickle
 import subprocess
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.csv
 import pytest
 from conftest import ROOT, rows
