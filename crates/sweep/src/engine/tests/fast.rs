@@ -58,7 +58,8 @@ fn compare_with_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
 
 /// Computes the rows of a plan by the fast method and compares them with plain RK4 at a step (s).
 /// Every row that is marked as converged must have the same verdict and an error within 5 times the
-/// accuracy, and few rows may exceed the accuracy itself.
+/// accuracy, and few rows may exceed the accuracy itself. At most one row of eight that is not
+/// chaotic may not have converged.
 fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
     let fast_plan = Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let rows = outcomes_of_plan(&fast_plan);
@@ -86,6 +87,13 @@ fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
             plan.name
         );
     }
+    let is_skipped = |row: &&Outcome| row.converged == Some(false) && row.sensitive == Some(false);
+    let skipped_count = rows.iter().filter(is_skipped).count();
+    assert!(
+        skipped_count <= rows.len() / 8,
+        "{}: {skipped_count} rows are not compared",
+        plan.name
+    );
     // In the 1287 rows of Fig. 12 these are violent motions with an error of the least gap of up to
     // 4.4 times the accuracy.
     assert!(
