@@ -134,7 +134,8 @@ fn compute_bin_edges(scatter: &Scatter) -> Vec<f64> {
     let origin = limit.map_or(low_coordinate, |limit| scale.coordinate(limit));
     let first_edge_index = ((low_coordinate - origin) / bin_width).floor() as i64;
     // The last bin must reach the greatest value.
-    let last_edge_index = (((high - origin) / bin_width).ceil() as i64).max(first_edge_index + 1);
+    let last_edge_index =
+        (((high_coordinate - origin) / bin_width).ceil() as i64).max(first_edge_index + 1);
     (first_edge_index..=last_edge_index)
         .map(|k| match limit {
             Some(limit) if k == 0 => limit,
