@@ -4,10 +4,9 @@
 //! A batch costs the same with one trajectory as with eight, because trajectories fill the lanes of
 //! a vector. So runs of one level wait for each other, and a thread takes a batch as soon as one is
 //! full. It takes the finest level first, so that rows that are nearly done leave the queue. Once
-//! the source is empty, batches that are not full are taken, too, the coarsest level first, because
-//! its rows may need all finer levels. By a method that chooses steps for each trajectory, batches
-//! are larger and begin with the longest trajectories: a lane that ends early continues with the
-//! next trajectory.
+//! the source is empty, the threads share all runs of the coarsest level, because its rows may need
+//! all finer levels. By a method that chooses steps for each trajectory, batches are larger and
+//! begin with the longest trajectories: a lane that ends early continues with the next trajectory.
 //!
 //! A lane's numbers do not depend on the other lanes, so a row does not depend on its batch.
 
@@ -277,15 +276,15 @@ impl PoolState {
         full_batch_size: &dyn Fn(RunKind) -> usize,
         threads: usize,
     ) -> ThreadAction {
-        let is_batch_full = |(kind, waiting_ids): &(&RunKind, &Vec<u64>)| {
-            waiting_ids.len() >= full_batch_size(**kind)
-        };
-        let finest_kind = self.waiting_rows.iter().rfind(is_batch_full).map(|(kind, _)| *kind);
-        if let Some(kind) = finest_kind.or_else(|| self.find_overdue_kind()) {
-            return self.take_batch(kind, full_batch_size(kind));
-        }
         if !self.is_source_empty {
-            return ThreadAction::Prepare;
+            let is_batch_full = |(kind, waiting_ids): &(&RunKind, &Vec<u64>)| {
+                waiting_ids.len() >= full_batch_size(**kind)
+            };
+            let finest_kind = self.waiting_rows.iter().rfind(is_batch_full).map(|(kind, _)| *kind);
+            return match finest_kind.or_else(|| self.find_overdue_kind()) {
+                Some(kind) => self.take_batch(kind, full_batch_size(kind)),
+                None => ThreadAction::Prepare,
+            };
         }
         let coarsest_runs =
             self.waiting_rows.iter().find(|(_, waiting_ids)| !waiting_ids.is_empty());
