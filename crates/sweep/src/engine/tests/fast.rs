@@ -360,26 +360,28 @@ fn rows_with_friction_and_ringing_bearings_converge() {
 }
 
 /// When the drum begins to brake, the hinge of the linear model rings. Capped levels agree on
-/// speeds of dampers that are wrong by 2e-3.
+/// speeds of dampers that are wrong by up to 2e-3, at some of these peaks.
 #[test]
 fn speeds_of_dampers_are_accurate_where_the_hinge_rings() {
-    let plan = load_with_elements(
-        "metrics = [\"damper_speed\"]\n\
-         [spin]\nprofile = \"triangular\"\npeak_rpm = 337\nramp_s = 2.77\n\
-         [time]\nend_s = 5\nwindow_s = [1.9, 5]\n\
-         [set]\nfriction_n = 41.75\nstop_1_clearance_m = 0.0061\n\
-         stop_2_clearance_m = 0.00383\nunbalance_2_mass_kg = 0.172\n\
-         flexure_stiffness_n_m_per_rad = 53321\ntub_mass_kg = 15.1\n\
-         tub_centre_x_m = 0.193\nbearing_front_x_m = 0.0706\n\
-         [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.37]\n\
-         [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [50, 174, 202]\n\
-         [reliability]\nratio_limit = 1.5\n",
-    );
-    for (row, expected) in outcomes_of_plan(&plan).iter().zip(rows_by_rk4(&plan, 1e-4)) {
-        assert_eq!(row.converged, Some(true));
+    for peak_rpm in (324..=350).step_by(2) {
+        let plan = load_with_elements(&format!(
+            "metrics = [\"damper_speed\"]\n\
+             [spin]\nprofile = \"triangular\"\npeak_rpm = {peak_rpm}\nramp_s = 2.77\n\
+             [time]\nend_s = 5\nwindow_s = [1.9, 5]\n\
+             [set]\nfriction_n = 41.75\nflexure_stiffness_n_m_per_rad = 53321\n\
+             tub_mass_kg = 15.1\nunbalance_mass_kg = 0.37\ndamping_n_s_per_m = 174\n\
+             [reliability]\nratio_limit = 1.5\n\
+             channels = [\"total_centre_y\", \"total_centre_z\", \"tub_pitch\"]\n",
+        ));
+        let row = outcomes_of_plan(&plan).remove(0);
+        let expected = rows_by_rk4(&plan, 1e-4).remove(0);
+        assert_eq!(row.converged, Some(true), "{peak_rpm} rpm");
         for (speed, expected_speed) in row.linear.metrics.iter().zip(&expected.linear.metrics) {
             let relative = (speed / expected_speed - 1.0).abs();
-            assert!(relative < 1e-3, "{speed} and {expected_speed} m/s differ by {relative:e}");
+            assert!(
+                relative < 1e-3,
+                "{speed} and {expected_speed} m/s differ by {relative:e} at {peak_rpm} rpm"
+            );
         }
     }
 }
