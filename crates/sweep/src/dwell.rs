@@ -131,7 +131,7 @@ impl AttractorSearch {
     }
 
     /// Returns the search and its speeds as JSON, for the plan of a result.
-    pub(crate) fn to_json(&self, speeds_rpm: &[f64]) -> Value {
+    pub(crate) fn to_json(self, speeds_rpm: &[f64]) -> Value {
         let mut search_json = json!({
             "speed_rpm": speeds_rpm,
             "longest_s": self.longest,
