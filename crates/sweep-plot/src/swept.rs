@@ -112,7 +112,8 @@ pub fn axis_columns(source: &FigureFile) -> Vec<&ColumnFacts> {
 /// one.
 ///
 /// # Errors
-/// Returns the errors of [`axes`], except for rows that do not lie on a grid, which give `false`.
+/// Returns the errors of [`read_axes`], except for rows that do not lie on a grid, which give
+/// `false`.
 pub fn is_whole_grid(source: &FigureFile) -> Result<bool> {
     let axes = match read_axes(source) {
         Ok(axes) => axes,
