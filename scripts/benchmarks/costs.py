@@ -48,7 +48,8 @@ values = [0.2, 0.4]
 SHARDS = 3 if IS_CHECK else 64
 ROUNDS = 1 if IS_CHECK else 3
 # The grid files of a map by the fast method and by plain rk4.
-FAST_GRID, PLAIN_GRID = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
+FAST_GRID = "quick" if IS_CHECK else "fig12"
+PLAIN_GRID = "quick" if IS_CHECK else "fig12_reference"
 SPEEDS = "240:260:10" if IS_CHECK else "210:350:1"
 # The numbers of unbalance masses in the grids of a million and of ten million rows.
 MASSES = (100, 300) if IS_CHECK else (1000, 10_000)
@@ -187,7 +188,8 @@ def measure_points(sweep, folder):
     rows.append(["chunks, hashes, syncs, progress and join",
                  ", ".join(main_thread_shares) + " of these times", "the same: the main thread"])
     rows += measure_second_thread(sweep, folder)
-    words, result = f"stability sweeps/{FAST_GRID}.toml --speed {SPEEDS}", folder / "speeds.parquet"
+    words = f"stability sweeps/{FAST_GRID}.toml --speed {SPEEDS}"
+    result = folder / "speeds.parquet"
     stability = MeasuredCommand(sweep, *words.split(), "--out", result, "--fresh")
     rows.append([f"stability of {count_rows(result)} responses",
                  describe_run(stability, result.stat().st_size / 1e6), f"`sweep {words}`"])

@@ -52,9 +52,11 @@ def test_constants_replace_values_of_the_machine():
 def test_a_dictionary_that_is_nested_too_deep_is_rejected():
     endless = dict(SHORT_GRID)
     endless["spin"] = endless
-    nested_grid, nested_list = {}, []
+    nested_grid = {}
+    nested_list = []
     for _ in range(20_000):
-        nested_grid, nested_list = {"spin": nested_grid}, [nested_list]
+        nested_grid = {"spin": nested_grid}
+        nested_list = [nested_list]
     lists = []
     lists.append(lists)
     for grid in (endless, nested_grid, {"axis": nested_list}, {"axis": lists}):
