@@ -16,7 +16,7 @@ LAST_OLD_SUBJECT = "8ddff34c"
 MAX_SUBJECT_COLUMNS = 72
 # Verbs with which the subject of a commit may begin.
 IMPERATIVES = set("""
-    Accept Add Allow Announce Answer Apply Ask Avoid Bound Build Call Change Check Clarify Clean
+    Accept Add Allow Announce Answer Apply Ask Avoid Bind Bound Build Call Change Check Clarify Clean
     Close Collect Compare Complete Compute Copy Correct Count Cut Decide Declare Delete Derive
     Describe Document Draw Drop End Evaluate Exclude Expect Explain Export Extend Fail Find Fix
     Follow Format Give Guard Handle Hold Implement Import Improve Include Install Integrate Join
