@@ -315,10 +315,10 @@ impl<'a> UnsuspendedMachine<'a> {
         machine: &Machine,
         elastic_deflection: &[f64; COORDINATES],
     ) -> FrontDeflection {
-        let rigid_acceleration = self.rigid_motion(&self.multiply_mass(elastic_deflection));
+        let recoil = self.rigid_motion(&self.multiply_mass(elastic_deflection));
         let drum = &machine.drum;
-        let tub_m = rigid_acceleration[TUB_Y].hypot(rigid_acceleration[TUB_Z]);
-        let tub_angle_rad = rigid_acceleration[TUB_YAW].hypot(rigid_acceleration[TUB_PITCH]);
+        let tub_m = recoil[TUB_Y].hypot(recoil[TUB_Z]);
+        let tub_angle_rad = recoil[TUB_YAW].hypot(recoil[TUB_PITCH]);
         let bearings_m = elastic_deflection[SHAFT_Y].hypot(elastic_deflection[SHAFT_Z]);
         let bearings_rad = elastic_deflection[SHAFT_YAW].hypot(elastic_deflection[SHAFT_PITCH]);
         let hinge_rad = elastic_deflection[HINGE_YAW].hypot(elastic_deflection[HINGE_PITCH]);
@@ -330,16 +330,18 @@ impl<'a> UnsuspendedMachine<'a> {
             drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_angle_rad,
             tub_front_m,
             tub_angle_rad,
-            tub_front_m_per_s: self.frequency_rad_per_s(elastic_deflection) * tub_front_m,
+            tub_front_m_per_s: self.frequency_rad_per_s(elastic_deflection, &recoil) * tub_front_m,
         }
     }
 
-    /// Returns the frequency of the free vibration with the shape of an elastic deflection, by
-    /// Rayleigh's quotient.
-    fn frequency_rad_per_s(&self, elastic_deflection: &[f64; COORDINATES]) -> f64 {
-        let rigid_motion = self.rigid_motion(&self.multiply_mass(elastic_deflection));
-        let shape: [f64; COORDINATES] =
-            core::array::from_fn(|i| elastic_deflection[i] - rigid_motion[i]);
+    /// Returns the frequency of the free vibration with the shape of an elastic deflection less the
+    /// recoil of the whole machine, by Rayleigh's quotient.
+    fn frequency_rad_per_s(
+        &self,
+        elastic_deflection: &[f64; COORDINATES],
+        recoil: &[f64; COORDINATES],
+    ) -> f64 {
+        let shape: [f64; COORDINATES] = core::array::from_fn(|i| elastic_deflection[i] - recoil[i]);
         let momentum = self.multiply_mass(&shape);
         let modal_mass: f64 = shape.iter().zip(&momentum).map(|(x, p)| x * p).sum();
         let modal_stiffness: f64 = ELASTIC_COORDINATES

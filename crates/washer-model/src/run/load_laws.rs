@@ -7,6 +7,7 @@ use super::load_components::LoadSelection;
 use super::suspension::{compute_forces, dual, tub_with_deviation};
 use crate::coordinates::{STATES, TUB_COORDINATES};
 use crate::lanes::{InLanes as _, ToDual as _};
+use crate::machine::feet::LOAD_COMPONENTS;
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::dot;
 use crate::{COORDINATES, ModelKind, Point};
@@ -137,8 +138,8 @@ impl<T: Lane> LoadLaws<T> {
         }
     }
 
-    /// Computes the load components at a motion of the tub. Returns the square of the force on the
-    /// cabinet.
+    /// Computes the selected load components at a motion of the tub. Returns the square of the
+    /// force on the cabinet, which is zero if that is not selected.
     #[inline(always)]
     pub(super) fn evaluate(
         &mut self,
@@ -162,14 +163,18 @@ impl<T: Lane> LoadLaws<T> {
                 force_squared = to_sample(dot(&force, &force));
             }
             Self::Linear { force, components: expansions } => {
-                for expansion in force {
-                    let N(dual) = expansion.evaluate(tub);
-                    let force = N(dual.value);
-                    let rate = N(dual.slope);
-                    force_squared.value += force * force;
-                    force_squared.slope += (2.0 * force).v() * rate;
+                if selection.has_cabinet_force {
+                    for expansion in force {
+                        let N(dual) = expansion.evaluate(tub);
+                        let force = N(dual.value);
+                        let rate = N(dual.slope);
+                        force_squared.value += force * force;
+                        force_squared.slope += (2.0 * force).v() * rate;
+                    }
                 }
-                for (component, expansion) in components.iter_mut().zip(expansions) {
+                let first_recorded = if selection.has_feet { 0 } else { LOAD_COMPONENTS };
+                let recorded_components = components.iter_mut().zip(expansions);
+                for (component, expansion) in recorded_components.skip(first_recorded) {
                     *component = expansion.evaluate(tub);
                 }
             }

@@ -99,18 +99,22 @@ impl<T: Lane> LoadRecorder<T> {
         point: &Point,
         substeps: u32,
     ) -> Option<Self> {
-        let [_, force, element_gauges @ ..] = gauges;
-        let records_elements = element_gauges != [false; Gauge::ALL.len() - 2];
-        if !records_elements && !force {
+        let elements = &point.machine.elements;
+        let is_any_in_use = |group: &[Gauge]| group.iter().any(|gauge| gauges[*gauge as usize]);
+        let count_if = |is_recorded: bool, count: usize| if is_recorded { count } else { 0 };
+        let records_feet =
+            is_any_in_use(&[Gauge::FootLoad, Gauge::SlipMargin, Gauge::WalkMargin]);
+        let records_stops = is_any_in_use(&[Gauge::StopForce, Gauge::StopContact]);
+        let records_dampers = is_any_in_use(&[Gauge::DamperSpeed]);
+        let has_cabinet_force = is_any_in_use(&[Gauge::CabinetForce]);
+        if !(has_cabinet_force || records_feet || records_stops || records_dampers) {
             return None;
         }
-        let elements = &point.machine.elements;
-        let records_dampers = gauges[Gauge::DamperSpeed as usize];
         let selection = LoadSelection {
-            has_cabinet_force: force,
-            has_feet: records_elements && point.feet.is_some(),
-            stop_count: if records_elements { elements.stops.len() } else { 0 },
-            damper_count: if records_dampers { elements.dampers.len() } else { 0 },
+            has_cabinet_force,
+            has_feet: records_feet && point.feet.is_some(),
+            stop_count: count_if(records_stops, elements.stops.len()),
+            damper_count: count_if(records_dampers, elements.dampers.len()),
         };
         let load_laws = LoadLaws::new(zero, model, elements, selection);
         let mut stops = Vec::with_capacity(selection.stop_count);
