@@ -105,12 +105,7 @@ impl<T: Lane> Elements<T> {
         if self.has_optional_forces.is_set() {
             // The copy lets `load` stay in registers if there are no optional forces.
             let mut load_copy = load;
-            let motion = *tub;
-            zero.0.run_out_of_line(OptionalForces {
-                elements: self,
-                tub: &motion,
-                load: &mut load_copy,
-            });
+            zero.0.run_out_of_line(OptionalForces { elements: self, tub, load: &mut load_copy });
             load = load_copy;
         }
         load
