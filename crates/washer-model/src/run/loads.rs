@@ -102,8 +102,7 @@ impl<T: Lane> LoadRecorder<T> {
         let elements = &point.machine.elements;
         let is_any_in_use = |group: &[Gauge]| group.iter().any(|gauge| gauges[*gauge as usize]);
         let count_if = |is_recorded: bool, count: usize| if is_recorded { count } else { 0 };
-        let records_feet =
-            is_any_in_use(&[Gauge::FootLoad, Gauge::SlipMargin, Gauge::WalkMargin]);
+        let records_feet = is_any_in_use(&[Gauge::FootLoad, Gauge::SlipMargin, Gauge::WalkMargin]);
         let records_stops = is_any_in_use(&[Gauge::StopForce, Gauge::StopContact]);
         let records_dampers = is_any_in_use(&[Gauge::DamperSpeed]);
         let has_cabinet_force = is_any_in_use(&[Gauge::CabinetForce]);

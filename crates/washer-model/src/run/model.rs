@@ -50,15 +50,15 @@ pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
 #[inline(always)]
 fn moving_coordinates<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
     let (q, u) = split_state(x);
-    MovingCoordinates { q, u, a: split_state(dx).1 }
+    let (_, a) = split_state(dx);
+    MovingCoordinates { q: *q, u: *u, a: *a }
 }
 
-/// Splits a state, or its derivative, into the parts of coordinates and of speeds.
+/// Splits a state, or its derivative, into the parts of coordinates and of speeds, without a copy.
 #[inline(always)]
-pub(crate) fn split_state<T: Copy>(
-    x: &[N<T>; STATES],
-) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
-    (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
+pub(crate) fn split_state<T>(x: &[N<T>; STATES]) -> (&[N<T>; COORDINATES], &[N<T>; COORDINATES]) {
+    let (parts, _) = x.as_chunks();
+    (&parts[0], &parts[1])
 }
 
 /// Returns the tub's coordinates with two derivatives, from a state and its derivative.
@@ -109,7 +109,7 @@ impl<T: Lane> System<T, STATES> for NonlinearModel<T> {
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split_state(x);
         let Self { machine, coupling, sag, .. } = self;
-        join_derivative(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
+        join_derivative(u, &nonlinear::accelerations(machine, coupling, sag, spin, q, u))
     }
 
     #[inline(always)]
@@ -129,7 +129,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for NonlinearModel<T> {
         g_s: N<T>,
     ) -> [N<T>; STATES] {
         let (q, u) = split_state(x);
-        solve_implicit_stage(&self.machine, spin, &q, &u, r, g_s)
+        solve_implicit_stage(&self.machine, spin, q, u, r, g_s)
     }
 }
 
@@ -153,7 +153,7 @@ impl<T: Lane> NonlinearModel<T> {
         x: &[N<T>; STATES],
     ) -> [[N<T>; COORDINATES]; TUB_COORDINATES.len()] {
         let (q, u) = split_state(x);
-        nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
+        nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, q, u)
     }
 }
 
@@ -268,8 +268,8 @@ impl<T: Lane> System<T, STATES> for LinearModel<T> {
     fn derivative(&self, forcing: &LinearForcing<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split_state(x);
         join_derivative(
-            &u,
-            &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, &q, &u),
+            u,
+            &step::accelerations(&self.constants, &self.coupling, &forcing.rotor, q, u),
         )
     }
 
@@ -296,7 +296,7 @@ impl<T: Lane> SemiImplicit<T, STATES> for LinearModel<T> {
             rotor_coefficients,
             *flexure_stiffness,
             &forcing.spin,
-            (&q, &u),
+            (q, u),
             r,
             g_s,
         )
