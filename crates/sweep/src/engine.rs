@@ -116,7 +116,7 @@ impl<'a> ModelEngine<'a> {
         }
     }
 
-    fn with_simd(forced: Option<Simd>, plan: &'a Plan) -> Self {
+    fn with_simd(required_simd: Option<Simd>, plan: &'a Plan) -> Self {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINT_COUNT } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
@@ -124,7 +124,7 @@ impl<'a> ModelEngine<'a> {
         Self {
             plan,
             purpose: OutcomePurpose::Row,
-            required_simd: forced,
+            required_simd,
             timing,
             row_rule: make_row_rule(plan),
             levels,
