@@ -16,16 +16,16 @@ LAST_OLD_SUBJECT = "8ddff34c"
 MAX_SUBJECT_COLUMNS = 72
 # Verbs with which the subject of a commit may begin.
 IMPERATIVES = set("""
-    Accept Add Allow Announce Answer Apply Ask Avoid Bind Bound Build Call Change Check Clarify Clean
-    Close Collect Compare Complete Compute Copy Correct Count Cut Decide Declare Delete Derive
+    Accept Add Allow Announce Answer Apply Ask Avoid Bind Bound Build Call Change Check Clarify
+    Clean Close Collect Compare Complete Compute Copy Correct Count Cut Decide Declare Delete Derive
     Describe Document Draw Drop End Evaluate Exclude Expect Explain Export Extend Fail Find Fix
     Follow Format Give Guard Handle Hold Implement Import Improve Include Install Integrate Join
     Keep Leave Let Limit List Load Lock Make Map Mark Match Measure Mend Merge Move Name Note Order
-    Parse Plot Point Prefer Print Promise Protect Prove Put Raise Read Record Reduce Refuse Release
-    Remove Rename Renew Repair Replace Report Require Reset Respect Restore Return Review Rewrite
-    Round Run Save Say Search Separate Set Share Shorten Show Simplify Skip Solve Sort Speed Split
-    Start State Stop Store Support Take Tell Test Tighten Track Trust Try Turn Type Unify Update Use
-    Validate Verify Wait Warn Widen Wrap Write
+    Parse Pass Plot Point Prefer Print Promise Protect Prove Put Raise Read Record Reduce Refuse
+    Release Remove Rename Renew Repair Replace Report Require Reset Respect Restore Return Review
+    Rewrite Round Run Save Say Search Separate Set Share Shorten Show Simplify Skip Solve Sort Speed
+    Split Start State Stop Store Support Take Tell Test Tighten Track Trust Try Turn Type Unify
+    Update Use Validate Verify Wait Warn Widen Wrap Write
 """.split())
 
 # First words of comments that are no sentences of their own. "Whether" may document a bool.
