@@ -53,9 +53,9 @@ use crate::separation::Separation;
 
 /// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
-/// Basis: 2 is the smallest whole number at which the error may decrease by less than half
-/// ([`STEP_CONTRACTION`]). Doubling it doubles every `error`, and sends twice as many rows to the
-/// next level.
+/// Basis: 2 is the smallest whole number at which a step may be more than half of the step before
+/// ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows to the next
+/// level.
 const SAFETY_FACTOR: f64 = 2.0;
 
 /// The guaranteed contraction of the error from one step to the next: 1.5.
@@ -64,14 +64,9 @@ const SAFETY_FACTOR: f64 = 2.0;
 /// [`SAFETY_FACTOR`] s times that is at least E / c where c is at least 1 + 1 / s.
 const STEP_CONTRACTION: f64 = 1.0 + 1.0 / SAFETY_FACTOR;
 
-/// The ratio of one level's step to the next one's, for fixed steps.
-///
-/// Basis: the error of a cap is proportional to its inverse square, and the cap to the inverse
-/// step, so that errors contract by (4/3)^2, more than [`STEP_CONTRACTION`], and the estimate is
-/// 1.6 times the error. With a ratio of 1.22 the estimate is the error itself, and 10 of 31,500
-/// random rows were beyond their accuracy (`differential_test -- 900 clock`). Doubling it leaves
-/// two capped levels, the second of which takes 2.7 times as long as the first.
-const STEP_RATIO: f64 = 4.0 / 3.0;
+/// The order with which errors decrease with the step for capped modes: the error of a cap is
+/// proportional to its inverse square, and the cap to the inverse step.
+const CAPPED_ORDER: f64 = 2.0;
 
 /// The ratio of the relative tolerance at a level to that at the level before. The first tolerance
 /// of a method is the accuracy times this ratio.
@@ -109,6 +104,12 @@ pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
 /// The step (s) for a machine whose modes are unknown, whose rows fail. It decides nothing.
 const UNKNOWN_STEP_S: f64 = 1e-3;
+
+/// Returns the ratio of one level's step to the next one's, for errors that decrease with this
+/// order.
+fn step_ratio(order: f64) -> f64 {
+    STEP_CONTRACTION.powf(1.0 / order)
+}
 
 /// Returns the contraction of the error from a level to the next.
 ///
@@ -158,17 +159,18 @@ pub fn refinement_levels(
     let mut levels = Vec::new();
     // The rows of a machine whose modes are unknown report that themselves, at any step.
     let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(UNKNOWN_STEP_S);
+    let ratio = step_ratio(CAPPED_ORDER);
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
         for kind in MethodKind::CAPPED {
-            if step_s < STEP_RATIO * first_s {
+            if step_s < ratio * first_s {
                 break;
             }
             levels.push(capped_method(model, kind, step_s));
-            step_s /= STEP_RATIO;
+            step_s /= ratio;
         }
     }
-    let following_s = push_uncapped_levels(&mut levels, Method::rk4, first_s);
+    let following_s = push_uncapped_levels(&mut levels, Method::rk4, [first_s, ratio]);
     push_resolving_levels(&mut levels, steps, model, following_s);
     RefinementLevels::checked(levels, None)
 }
@@ -216,16 +218,20 @@ fn push_resolving_levels(
         None => longest_s,
     };
     let first_s = resolving_step_s.min(longest_s);
-    push_uncapped_levels(levels, method, first_s);
+    push_uncapped_levels(levels, method, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
-/// Adds levels without capped modes in fixed steps, the first with a step of `first_s`. Returns the
-/// step after the last.
-fn push_uncapped_levels(levels: &mut Vec<Method>, method: fn(f64) -> Method, first_s: f64) -> f64 {
+/// Adds levels without capped modes in fixed steps, the first with a step of `first_s`, each other
+/// with the step before divided by `ratio`. Returns the step after the last.
+fn push_uncapped_levels(
+    levels: &mut Vec<Method>,
+    method: fn(f64) -> Method,
+    [first_s, ratio]: [f64; 2],
+) -> f64 {
     let mut step_s = first_s;
     for _ in 0..LEVELS_PER_METHOD {
         levels.push(method(step_s));
-        step_s /= STEP_RATIO;
+        step_s /= ratio;
     }
     step_s
 }
@@ -264,13 +270,12 @@ mod tests {
         assert_eq!(contraction(MethodKind::Additive, FamilyStart::None), 10.0);
     }
 
-    /// Levels whose errors decrease at least as those of caps do have errors of at most the
-    /// estimate.
+    /// Levels whose errors decrease at least by the ratio have errors of at most the estimate.
     #[test]
-    fn the_estimate_bounds_errors_of_the_order_of_caps() {
-        let cap_order = 2.0;
+    fn the_step_ratio_bounds_errors_of_the_order_that_it_is_made_for() {
+        let ratio = step_ratio(CAPPED_ORDER);
         for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
-            let error = |level: i32| STEP_RATIO.powf(-f64::from(level) * (cap_order + steeper));
+            let error = |level: i32| ratio.powf(-f64::from(level) * (CAPPED_ORDER + steeper));
             let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
             assert!(error_of_level(first, 0.0).unwrap() >= 0.999_999 * error(1));
             let contracted = first / contraction(MethodKind::Capped1, FamilyStart::None);
