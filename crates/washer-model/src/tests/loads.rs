@@ -297,3 +297,24 @@ fn a_machine_without_stops_and_cabinet_has_only_damper_speeds() {
     let speeds = core::mem::take(&mut reading.gauges[Gauge::DamperSpeed as usize]);
     assert_eq!((speeds.len(), reading), (2, Reading::default()));
 }
+
+/// Only the loads that a gauge needs are evaluated.
+#[test]
+fn a_gauge_does_not_depend_on_the_other_gauges_in_use() {
+    let point = prepare_ramp_point(machine_with_cabinet(machine_with_every_element()));
+    let read = |model: ModelKind, recorders: Recorders| {
+        let (_, mut readings) =
+            simulate_with(Simd::widest(), model, &Method::rk4(2e-4), &[&point], recorders);
+        readings.remove(0)
+    };
+    for model in ModelKind::ALL {
+        let gauges = Gauge::ALL.map(|_| true);
+        let reading_of_all = read(model, Recorders { gauges, ..Recorders::default() });
+        for gauge in Gauge::ALL {
+            let reading = read(model, Recorders::with_gauge(gauge));
+            let values = reading.gauge_values(gauge);
+            assert!(!values.is_empty(), "{gauge:?}");
+            assert_eq!(values, reading_of_all.gauge_values(gauge), "{gauge:?}, {model:?}");
+        }
+    }
+}
