@@ -84,7 +84,7 @@ impl<T: Lane> ActiveRecorders<T> {
             recorders,
             square_integrals: SquareIntegrals::new(zero),
             turn_peaks: IntervalPeaks::new(zero),
-            loads: LoadRecorder::new(zero, recorders.gauges, model, point, substeps.count),
+            loads: LoadRecorder::new(zero, recorders, model, point, substeps.count),
             clash_time: TimeAbove::new(zero),
             clearance_squared: zero,
             snapshots,

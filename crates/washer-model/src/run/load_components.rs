@@ -20,10 +20,15 @@ pub(super) struct LoadSelection {
 }
 
 impl LoadSelection {
-    /// Returns the number of load components: the load on the cabinet, depth and force of each
-    /// stop, and the speed of each damper.
+    /// Returns the number of load components: the load on the cabinet if feet are recorded, depth
+    /// and force of each stop, and the speed of each damper.
     pub(super) fn component_count(self) -> usize {
-        LOAD_COMPONENTS + 2 * self.stop_count + self.damper_count
+        self.first_stop_component() + 2 * self.stop_count + self.damper_count
+    }
+
+    /// Returns the index of the first component after the load on the cabinet.
+    pub(super) const fn first_stop_component(self) -> usize {
+        if self.has_feet { LOAD_COMPONENTS } else { 0 }
     }
 
     /// Computes the load components by the elements' force laws. Returns the force on the tub.
@@ -42,13 +47,14 @@ impl LoadSelection {
         if self.has_feet {
             components[..LOAD_COMPONENTS].copy_from_slice(&load_on_cabinet_axes(tub, &tub_load));
         }
+        let first_stop = self.first_stop_component();
         for k in 0..self.stop_count {
-            [components[LOAD_COMPONENTS + 2 * k], components[LOAD_COMPONENTS + 2 * k + 1]] =
+            [components[first_stop + 2 * k], components[first_stop + 2 * k + 1]] =
                 elements.stop_depth_and_force(k, tub);
         }
+        let first_damper = first_stop + 2 * self.stop_count;
         for k in 0..self.damper_count {
-            components[LOAD_COMPONENTS + 2 * self.stop_count + k] =
-                elements.damper_motion(k, tub)[1];
+            components[first_damper + k] = elements.damper_motion(k, tub)[1];
         }
         tub_load.0
     }

@@ -7,7 +7,6 @@ use super::load_components::LoadSelection;
 use super::suspension::{compute_forces, dual, tub_with_deviation};
 use crate::coordinates::{STATES, TUB_COORDINATES};
 use crate::lanes::{InLanes as _, ToDual as _};
-use crate::machine::feet::LOAD_COMPONENTS;
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::dot;
 use crate::{COORDINATES, ModelKind, Point};
@@ -172,9 +171,7 @@ impl<T: Lane> LoadLaws<T> {
                         force_squared.slope += (2.0 * force).v() * rate;
                     }
                 }
-                let first_recorded = if selection.has_feet { 0 } else { LOAD_COMPONENTS };
-                let recorded_components = components.iter_mut().zip(expansions);
-                for (component, expansion) in recorded_components.skip(first_recorded) {
+                for (component, expansion) in components.iter_mut().zip(expansions) {
                     *component = expansion.evaluate(tub);
                 }
             }

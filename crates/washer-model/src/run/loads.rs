@@ -7,7 +7,7 @@ use crate::coordinates::STATES;
 use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{LOAD_COMPONENTS, LoadDistribution, MAX_FEET, turning_force_n};
 use crate::run::model::tub_samples;
-use crate::{ModelKind, Point};
+use crate::{ModelKind, Point, Recorders};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 sweep_parameter::named! {
@@ -94,18 +94,18 @@ impl<T: Lane> LoadRecorder<T> {
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
-        gauges: GaugeSelection,
+        recorders: Recorders,
         model: ModelKind,
         point: &Point,
         substeps: u32,
     ) -> Option<Self> {
         let elements = &point.machine.elements;
-        let is_any_in_use = |group: &[Gauge]| group.iter().any(|gauge| gauges[*gauge as usize]);
+        let is_any_in_use = |group: &[Gauge]| group.iter().any(|gauge| recorders.has_gauge(*gauge));
         let count_if = |is_recorded: bool, count: usize| if is_recorded { count } else { 0 };
         let records_feet = is_any_in_use(&[Gauge::FootLoad, Gauge::SlipMargin, Gauge::WalkMargin]);
         let records_stops = is_any_in_use(&[Gauge::StopForce, Gauge::StopContact]);
-        let records_dampers = is_any_in_use(&[Gauge::DamperSpeed]);
-        let has_cabinet_force = is_any_in_use(&[Gauge::CabinetForce]);
+        let records_dampers = recorders.has_gauge(Gauge::DamperSpeed);
+        let has_cabinet_force = recorders.has_gauge(Gauge::CabinetForce);
         if !(has_cabinet_force || records_feet || records_stops || records_dampers) {
             return None;
         }
@@ -254,8 +254,8 @@ impl<T: Lane> LoadRecorder<T> {
                 lanes_in_window,
             );
         }
-        let (stops, damper_speeds) =
-            self.components[LOAD_COMPONENTS..].split_at(2 * self.stops.len());
+        let first_stop = self.selection.first_stop_component();
+        let (stops, damper_speeds) = self.components[first_stop..].split_at(2 * self.stops.len());
         for (record, depth_and_force) in self.stops.iter_mut().zip(stops.chunks(2)) {
             let depth = to_sample(depth_and_force[0]);
             let force = to_sample(depth_and_force[1]);
