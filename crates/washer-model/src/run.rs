@@ -4,6 +4,7 @@
 pub(crate) mod active_recorders;
 mod checkpoints;
 pub(crate) mod equations;
+mod gauge;
 pub(crate) mod history;
 mod load_components;
 mod load_laws;
@@ -14,7 +15,7 @@ pub(crate) mod recorders;
 mod snapshots;
 pub(crate) mod suspension;
 
-pub use loads::Gauge;
+pub use gauge::Gauge;
 pub use method::{Method, MethodKind};
 pub use recorders::{Reading, Recorders};
 pub use snapshots::Snapshot;

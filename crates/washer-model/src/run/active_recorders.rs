@@ -3,7 +3,8 @@
 //! These recorders run over lanes after every step, in a function that is not inlined
 //! ([`Lane::run_out_of_line`]), so that the loop over steps is not slower if they are not in use.
 
-use super::loads::{Gauge, LoadRecorder};
+use super::gauge::Gauge;
+use super::loads::LoadRecorder;
 use super::snapshots::Snapshots;
 use super::{Method, MethodKind};
 use crate::channel::CHANNELS;

@@ -1,6 +1,7 @@
 //! Records the loads on the cabinet, on its feet and on stops, and the speeds of dampers, from the
 //! components that `load_components.rs` selects.
 
+use super::gauge::Gauge;
 use super::load_components::LoadSelection;
 use super::load_laws::{LoadLaws, to_sample};
 use crate::coordinates::STATES;
@@ -9,35 +10,6 @@ use crate::machine::feet::{LOAD_COMPONENTS, LoadDistribution, MAX_FEET, turning_
 use crate::run::model::tub_samples;
 use crate::{ModelKind, Point, Recorders};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
-
-sweep_parameter::named! {
-    /// A quantity of a trajectory that can be recorded within the window.
-    pub enum Gauge {
-        /// The time for which the gap is negative (s).
-        ClashTime = "clash_time",
-        /// The greatest magnitude of the sum of all forces of the suspension on the cabinet (N);
-        /// at rest it is the weight.
-        CabinetForce = "cabinet_force",
-        /// The greatest force of each stop (N).
-        StopForce = "stop_force",
-        /// The time for which each stop is closed (s).
-        StopContact = "stop_contact",
-        /// The least vertical load of each foot (N), below zero where it would lift; none if the
-        /// machine has no cabinet.
-        FootLoad = "foot_load",
-        /// The least margin against slipping (N): friction on all feet together less the
-        /// horizontal force; below zero the cabinet slips. None if the machine has no cabinet.
-        SlipMargin = "slip_margin",
-        /// The least margin against walking (N): the margin against slipping less the part of
-        /// friction that the moment about the vertical takes. None if the machine has no cabinet.
-        WalkMargin = "walk_margin",
-        /// The greatest speed along each damper (m/s).
-        DamperSpeed = "damper_speed",
-    }
-}
-
-/// Whether each gauge is in use, in the order of [`Gauge::ALL`].
-pub(crate) type GaugeSelection = [bool; Gauge::ALL.len()];
 
 /// A reference that is greater than all loads (N). Peaks record only greatest values, so that the
 /// least load is the reference less the greatest difference of reference and load.

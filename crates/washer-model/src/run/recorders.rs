@@ -1,7 +1,7 @@
 //! The optional recorders of a trajectory, and their readings.
 
 use super::Checkpoints;
-use super::loads::{Gauge, GaugeSelection};
+use super::gauge::{Gauge, GaugeSelection};
 use crate::Snapshot;
 use crate::channel::CHANNELS;
 
