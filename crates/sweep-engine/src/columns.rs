@@ -199,9 +199,8 @@ impl<R: 'static> ComparisonColumns<'_, R> {
         let reliable_rule = format!("{reliable_rule}; null where ratio_max is");
         let sensitive_description = "true where the motion is chaotic, and the row's digits are \
                                      those of one trajectory: a perturbed run separates \
-                                     exponentially, and its numbers or those of the level before \
-                                     differ by more than the accuracy; null where nothing was \
-                                     compared";
+                                     exponentially, and its numbers differ by more than half the \
+                                     accuracy; null where nothing was compared";
         let error_description = "greatest relative error of the row's numbers, from the \
                                  differences of its method's levels; null where nothing was \
                                  compared";

@@ -3,7 +3,9 @@
 
 use washer_model::{MethodKind, ModelKind, Point, UnresolvedModes};
 
-use crate::error_control::{amplification, contraction, difference_of_levels, error_of_level};
+use crate::error_control::{
+    amplification, contraction, difference_of_levels, error_of_chaos, error_of_level,
+};
 use crate::levels::{FamilyStart, RefinementLevels};
 use crate::measures::TURN_FLOOR;
 use crate::metrics::Metric;
@@ -187,24 +189,34 @@ impl ModelRefinement {
         self.perturbed_comparison.is_some_and(|comparison| comparison.is_chaotic)
     }
 
+    /// Whether the numbers are those of one chaotic trajectory, from which those of the perturbed
+    /// run differ. A motion that is chaotic for a part of the run may have numbers that do not
+    /// depend on that part.
+    fn is_sensitive(&self, accuracy: f64) -> bool {
+        self.perturbed_comparison.is_some_and(|PerturbedComparison { is_chaotic, difference }| {
+            let error = difference.and_then(|difference| error_of_chaos(0.0, difference));
+            is_chaotic && error.is_none_or(|error| error > accuracy)
+        })
+    }
+
     fn has_failed(&self) -> bool {
         self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
     }
 
     /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
+        let last = self.differences.last()?;
         if let Some(PerturbedComparison { is_chaotic: true, difference }) =
             self.perturbed_comparison
         {
-            return error_of_level(self.differences.last()?.difference_of_numbers?, difference?);
+            return error_of_chaos(last.difference_of_numbers?, difference?);
         }
         let kind = rule.levels.levels[self.level].kind;
         let contracted_difference = match self.differences[..] {
             [.., previous, _] => previous.contracted_to(kind),
             _ => 0.0,
         };
-        let last = self.differences.last()?;
-        let error = error_of_level(last.relative()?, contracted_difference)?;
+        let error = error_of_level(kind, last.relative()?, contracted_difference)?;
         Some(error.max(rule.relative_ringing(self.level, self)))
     }
 
@@ -351,10 +363,7 @@ impl RowRefinement {
             let greatest = |(a, b): (f64, f64)| a.max(b);
             outcome.error = nonlinear_error.zip(linear_error).map(greatest);
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
-            // The numbers of a motion that is chaotic for a part of the run may be independent of
-            // that part: then those of both levels and of the perturbed run agree.
-            let is_uncertain = nonlinear_error.is_none_or(|error| error > rule.accuracy);
-            outcome.sensitive = Some(nonlinear.is_chaotic() && is_uncertain);
+            outcome.sensitive = Some(nonlinear.is_sensitive(rule.accuracy));
         }
         Some(outcome)
     }
@@ -406,4 +415,24 @@ fn relative_difference(
         }
     }
     Some(greatest_difference)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A motion may be chaotic for a part of the run on which its numbers do not depend.
+    #[test]
+    fn chaotic_rows_are_sensitive_if_the_numbers_of_the_perturbed_run_differ() {
+        let is_sensitive = |is_chaotic, difference| {
+            let perturbed_comparison = Some(PerturbedComparison { is_chaotic, difference });
+            let refinement = ModelRefinement { perturbed_comparison, ..Default::default() };
+            refinement.is_sensitive(1e-3)
+        };
+        assert!(is_sensitive(true, Some(1e-2)));
+        assert!(is_sensitive(true, None));
+        assert!(!is_sensitive(true, Some(1e-4)));
+        assert!(!is_sensitive(false, Some(1e-2)));
+        assert!(!ModelRefinement::default().is_sensitive(1e-3));
+    }
 }

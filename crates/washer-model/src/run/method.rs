@@ -149,10 +149,7 @@ impl Method {
         if !self.kind.is_capped() {
             return format!("{name} (step {step_ms:.3} ms)");
         }
-        let order = match Formula::for_model(model) {
-            Formula::Rk4 => 4,
-            Formula::Dop853 => 8,
-        };
+        let order = Formula::for_model(model).order();
         let cap_rad_per_s = self.caps.bearings_rad_per_s;
         format!(
             "{name} (order {order}, step {step_ms:.3} ms, bearings capped at {cap_rad_per_s:.0} \

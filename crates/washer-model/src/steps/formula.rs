@@ -33,6 +33,14 @@ impl Formula {
         }
     }
 
+    /// Returns the order of the formula: the power of the step to which its error is proportional.
+    pub const fn order(self) -> u32 {
+        match self {
+            Self::Rk4 => 4,
+            Self::Dop853 => 8,
+        }
+    }
+
     /// Returns the greatest product of step and frequency (rad) that is used.
     ///
     /// This is below the formula's limit of stability, because large motions may be faster than the
