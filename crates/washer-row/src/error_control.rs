@@ -155,14 +155,18 @@ pub(crate) fn error_of_level(
     contracted_difference: f64,
 ) -> Option<f64> {
     let safety_factor = if kind.adapts_steps() { SAFETY_FACTOR } else { STEP_SAFETY_FACTOR };
-    let error = safety_factor * difference.max(contracted_difference);
-    error.is_finite().then_some(error)
+    finite_error(safety_factor, difference.max(contracted_difference))
 }
 
 /// Returns the error of a chaotic trajectory from the differences of its finest level from the
 /// level before and from the perturbed run. `None` if the error is not a finite number.
 pub(crate) fn error_of_chaos(difference: f64, perturbed_difference: f64) -> Option<f64> {
-    let error = SAFETY_FACTOR * difference.max(perturbed_difference);
+    finite_error(SAFETY_FACTOR, difference.max(perturbed_difference))
+}
+
+/// Returns the error that belongs to a difference; `None` if it is not a finite number.
+fn finite_error(safety_factor: f64, difference: f64) -> Option<f64> {
+    let error = safety_factor * difference;
     error.is_finite().then_some(error)
 }
 
@@ -264,13 +268,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_error_counts_a_great_difference_of_the_level_before() {
+    fn the_error_is_a_multiple_of_the_difference_or_more_if_the_difference_before_was_great() {
+        let additive =
+            |difference, before| error_of_level(MethodKind::Additive, difference, before);
+        assert_eq!(additive(1e-4, 0.0), Some(2e-4));
+        assert_eq!(additive(1e-4, 2e-4), Some(4e-4));
         let rk4 = |difference, before| error_of_level(MethodKind::Rk4, difference, before);
         assert_eq!(rk4(0.25, 0.0), Some(1.5));
         assert_eq!(rk4(0.25, 0.5), Some(3.0));
-        assert_eq!(rk4(f64::INFINITY, 0.0), None);
-        assert_eq!(rk4(0.25, f64::INFINITY), None);
-        assert_eq!(error_of_level(MethodKind::Additive, 0.25, 0.0), Some(0.5));
+        for error in [additive, rk4] {
+            assert_eq!(error(f64::INFINITY, 0.0), None);
+            assert_eq!(error(1e-4, f64::INFINITY), None);
+        }
     }
 
     /// Two chaotic motions may have the same least gap.
@@ -298,6 +307,24 @@ mod tests {
             let difference = contraction_of_error - 1.0;
             let error = error_of_level(MethodKind::Capped1, difference, 0.0);
             assert!(error.unwrap() >= 0.999_999);
+        }
+    }
+
+    /// Levels whose errors decrease at least as those of caps do have errors of at most the
+    /// estimate, even with the safety factor of tolerances.
+    #[test]
+    fn the_estimate_bounds_errors_of_the_order_of_caps() {
+        for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
+            let order = f64::from(CAPPED_ORDER) + steeper;
+            let error = |level: i32| step_ratio(CAPPED_ORDER).powf(-f64::from(level) * order);
+            let [first, second] = [1, 2].map(|level| error(level - 1) - error(level));
+            let contracted = first / contraction(MethodKind::Capped1, FamilyStart::None);
+            for kind in [MethodKind::Capped1, MethodKind::Additive] {
+                let [first_error, second_error] =
+                    [(first, 0.0), (second, contracted)].map(|(a, b)| error_of_level(kind, a, b));
+                assert!(first_error.unwrap() >= 0.999_999 * error(1));
+                assert!(second_error.unwrap() >= 0.999_999 * error(2));
+            }
         }
     }
 
